@@ -221,7 +221,7 @@ CALLS = {
     "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "likelihood"]},
     "dimensions.hurst_map": lambda: {"surface": rough(), "window": 1.6e-3},
     "dimensions.scaling": lambda: {"surface": rough(48)},
-    "dimensions.pool": lambda: {"estimates": estimates()},
+    "dimensions.pool": lambda: {"scans": estimates()},
     "dimensions.waves": lambda: {"surface": rough()},
     "dimensions.spectrum": lambda: {"surface": periodic()},
     "dimensions.variogram": lambda: {"surface": rough()},

@@ -283,6 +283,7 @@ def _estimate(
         misfit=_misfit(bins, found),
         window="asked for" if window is not None else "all wavelengths that one model describes",
         note=joined(*_findings(found, bins, dx, spread, height)),
+        posterior=found,
     )
     reason = diagnose(surface)
     if any(surface.grid.periodic) and not fit.lattice.periodic:

@@ -1,8 +1,9 @@
-"""One exponent from several scans: random effects over the estimates of each."""
+"""One exponent from several scans: their mean by random effects, or one that all have in common."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,12 @@ import xarray as xr
 from fractalcontact.base.random_effects import random_effects
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
+from fractalcontact.dimensions._estimate import estimate
+from fractalcontact.dimensions._likelihood import likelihood
+from fractalcontact.dimensions._spectral_posterior import joint_quantiles
+from fractalcontact.dimensions._surface_input import read_surfaces
+
+Array = np.ndarray[Any, np.dtype[Any]]
 
 SOURCE = (
     "Paule and Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377-385; "
@@ -18,29 +25,50 @@ SOURCE = (
     "Sidik and Jonkman, Statistics in Medicine 21 (2002) 3153-3159"
 )
 FEWER = "fewer than two scans have an interval"
+MODELS = ("random", "common")
+ESTIMATES = "results of fractalcontact.dimensions.estimate, or one along `scan`"
+SURFACES = "surfaces, whose likelihoods are multiplied"
+QUANTILES = 0.025, 0.5, 0.975
+DISAGREE = 1e-3  # probability of chi square from which on scans have no common exponent
 NEEDED = ("hurst", "standard_error", "fractal_dimension", "scale_min", "scale_max")
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    several = list(given.estimates.values()) if _is_mapping(given.estimates) else given.estimates
-    results = several if isinstance(several, (list, tuple)) else [several]
-    expected = "results of fractalcontact.dimensions.estimate, or one along `scan`"
-    problems.require(bool(results), "estimates", expected, NONE)
-    for each in results:
-        is_result = (
-            isinstance(each, xr.Dataset)
-            and set(NEEDED) <= set(each.variables)
-            and each.sizes.get("method", 0) > 0
-        )
-        got = Words(type(each).__name__)
-        if problems.require(is_result, "estimates", expected, got) and isinstance(given.method, str):
+    is_common = problems.choice("model", among=MODELS) and given.model == "common"
+    expected, is_one = (SURFACES, _is_surface) if is_common else (ESTIMATES, _is_result)
+    several = _listed(given.scans)
+    problems.require(bool(several), "scans", expected, NONE)
+    for each in several:
+        if not problems.require(is_one(each), "scans", expected, Words(type(each).__name__)):
+            continue
+        if is_common:
+            with problems.collect("scans: "):
+                estimate.validate(each)
+        elif isinstance(given.method, str):
             problems.choice("method", among=[str(name) for name in each["method"].values])
-    problems.require(given.method is None or isinstance(given.method, str), "method", "a name")
+    expected = "None (a common exponent is that of the likelihood)" if is_common else "a name"
+    problems.require(
+        given.method is None or (isinstance(given.method, str) and not is_common), "method", expected
+    )
 
 
-def _is_mapping(estimates: Any) -> bool:
-    return isinstance(estimates, Mapping) and not isinstance(estimates, xr.Dataset)
+def _is_surface(scan: Any) -> bool:
+    return isinstance(scan, xr.DataArray)
+
+
+def _is_result(scan: Any) -> bool:
+    return (
+        isinstance(scan, xr.Dataset)
+        and set(NEEDED) <= set(scan.variables)
+        and scan.sizes.get("method", 0) > 0
+    )
+
+
+def _listed(scans: Any) -> list[Any]:
+    if isinstance(scans, Mapping) and not isinstance(scans, xr.Dataset):
+        return list(scans.values())
+    return list(scans) if isinstance(scans, (list, tuple)) else [scans]
 
 
 @public_result(
@@ -50,20 +78,23 @@ def _is_mapping(estimates: Any) -> bool:
     check=_check,
     reasons=dict.fromkeys(("between_scans", "within_scans", "heterogeneity"), FEWER),
 )
-def pool(estimates: Any, method: str | None = None) -> xr.Dataset:
-    """Pool the exponents of several scans into one with a 95 % interval (random-effects meta-analysis).
+def pool(scans: Any, method: str | None = None, *, model: str = "random") -> xr.Dataset:
+    """Pool the exponents of several scans into one with a 95 % interval (meta-analysis, surface twin).
 
-    Each scan is fitted over the scales that it resolves. The scatter between scans is separated from the
-    error within each: scans of one surface at different resolutions (a digital surface twin) are weighted by
-    their errors as far as they agree, and evenly where they scatter more than that.
+    Each scan is fitted over the scales that it resolves, with an amplitude, a blur and a noise of its own.
 
     Parameters
     ----------
-    estimates : Dataset, or sequence or mapping of Datasets
-        From `fractalcontact.dimensions.estimate`: one for each scan, or one over `scan` (or any dims), as the
-        group `dimensions` of a study of many scans.
+    scans : Dataset or DataArray, or sequence or mapping of them
+        For "random", results of `fractalcontact.dimensions.estimate`: one for each scan, or one over `scan`
+        (or any dims), as the group `dimensions` of a study of many scans. For "common", surfaces.
     method : str, optional
         The method to pool. Default: the first one.
+    model : {"random", "common"}
+        "random": exponents that scatter from scan to scan, of which the mean is asked (random effects). The
+        scatter between scans is separated from the error within each; scans are weighted by their errors as
+        far as they agree, and evenly where they scatter more than that. "common": one exponent for all, as of
+        one surface at different resolutions, from a joint fit: the product of the likelihoods of all scans.
 
     Returns
     -------
@@ -71,18 +102,22 @@ def pool(estimates: Any, method: str | None = None) -> xr.Dataset:
         `hurst` with `ci_low` and `ci_high`, `fractal_dimension` with `fractal_dimension_low` and `_high`;
         `between_scans` and `within_scans`, standard deviations of the exponent between the scans and of the
         error within each (rms); `heterogeneity`, the share of the former in the sum of squares; `scan_count`;
-        `scale_min` and `scale_max` (m), the scales that all fits together span.
+        `scale_min` and `scale_max` (m), the scales that all fits together span; `reason`, why there is no
+        interval: scans that scatter more than one exponent allows have none with "common".
 
     Raises
     ------
     InvalidInput
-        `estimates` are no results of `estimate`, or `method` is not among theirs.
+        `scans` are not what the model takes, or `method` is not among theirs.
 
     Notes
     -----
-    Scans without an interval (`reason` states why) are left out. Variance between scans: Paule and Mandel;
-    interval: Hartung, Knapp, Sidik and Jonkman, whose factor is at least 1. It supposes that scans are
-    independent: of one area at several resolutions, that their scales overlap little.
+    Scans without an interval of their own are left out. "random": variance between scans by Paule and Mandel;
+    interval by Hartung, Knapp, Sidik and Jonkman, whose factor is at least 1. "common": the nuisances of each
+    scan are integrated out, the exponent has a flat prior. Both suppose that scans are independent: of one
+    area at several resolutions, that their scales overlap little. Three resolutions of one surface (64 x 64
+    points each, blur of 0.7 spacings, noise of 5 %), 200 draws each: the common interval covers 0.945
+    (H 0.3) and 0.975 (H 0.5) at a median width of 0.16 and 0.17; that of "random" always, at 0.38 and 0.41.
 
     References
     ----------
@@ -92,45 +127,92 @@ def pool(estimates: Any, method: str | None = None) -> xr.Dataset:
     Examples
     --------
     >>> import fractalcontact as fc
-    >>> scans = [fc.surfaces.fbm((64, 64), 1e-4, hurst=0.7, rms_increment=1e-6, rng=n) for n in range(4)]
-    >>> pooled = fc.dimensions.pool([fc.dimensions.estimate(scan, "increments") for scan in scans])
+    >>> fine = fc.surfaces.fbm((256, 256), 1e-6, hurst=0.7, rms_increment=1e-7, rng=1)
+    >>> twin = [fine[::4, ::4], fine[:64, :64]]
+    >>> pooled = fc.dimensions.pool(twin, model="common")
     >>> bool(pooled.ci_low < 0.7 < pooled.ci_high), int(pooled.scan_count)
-    (True, 4)
+    (True, 2)
     """
-    several = list(estimates.values()) if _is_mapping(estimates) else estimates
-    results = [each if method is None else each.sel({"method": [method]}) for each in _listed(several)]
-    first = [each.isel(method=0) for each in results]
-
-    def values(name: str) -> np.ndarray[Any, Any]:
-        return np.concatenate([np.asarray(each[name].values, dtype=float).ravel() for each in first])
-
-    hurst, error = values("hurst"), values("standard_error")
-    found = random_effects(hurst, error)
-    low, high = np.clip((found.low, found.high), 0.0, 1.0)
-    used = np.isfinite(hurst) & np.isfinite(error)
-    wholes = np.unique(np.rint(hurst + values("fractal_dimension"))[used])  # 3 of surfaces, 2 of profiles
+    found = _of_surfaces(_listed(scans)) if model == "common" else _of_results(_listed(scans), method)
+    used = np.isfinite(found.hurst) & np.isfinite(found.error)
+    hurst, error = found.hurst[used], found.error[used]
+    wholes = np.unique(found.whole[used])
     with Problems("fractalcontact.dimensions.pool") as problems:
         expected = "those of surfaces or of profiles"
-        problems.require(wholes.size <= 1, "estimates", expected, Words("those of both"))
+        problems.require(wholes.size <= 1, "scans", expected, Words("those of both"))
     whole = float(wholes[0]) if wholes.size else np.nan
-    ends = (values("scale_min")[used], values("scale_max")[used])
+    from scipy.special import chdtri
+
+    random = random_effects(hurst, error)
+    low, mean, high, reason = random.low, random.mean, random.high, FEWER if not used.any() else ""
+    if model == "common" and used.any():
+        low, mean, high = joint_quantiles([found.posteriors[n] for n in np.flatnonzero(used)], QUANTILES)
+        low -= found.too_high[used].max()
+        if float(np.sum(((hurst - mean) / error) ** 2)) > chdtri(hurst.size - 1, DISAGREE):
+            low = high = np.nan
+            reason = "the scans scatter more than one exponent allows: see the model 'random'"
+    low, high = np.clip((low, high), 0.0, 1.0)
     return xr.Dataset(
         {
-            "hurst": found.mean,
+            "hurst": mean,
             "ci_low": low,
             "ci_high": high,
-            "fractal_dimension": whole - found.mean,
+            "fractal_dimension": whole - mean,
             "fractal_dimension_low": whole - high,
             "fractal_dimension_high": whole - low,
-            "between_scans": found.between,
-            "within_scans": found.within,
-            "heterogeneity": found.heterogeneity,
-            "scan_count": found.count,
-            "scale_min": ends[0].min(initial=np.inf) if used.any() else np.nan,
-            "scale_max": ends[1].max(initial=0.0) if used.any() else np.nan,
+            "between_scans": random.between,
+            "within_scans": random.within,
+            "heterogeneity": random.heterogeneity,
+            "scan_count": random.count,
+            "scale_min": found.scale_min[used].min(initial=np.inf) if used.any() else np.nan,
+            "scale_max": found.scale_max[used].max(initial=0.0) if used.any() else np.nan,
+            "reason": reason,
         }
     )
 
 
-def _listed(estimates: Any) -> list[xr.Dataset]:
-    return list(estimates) if isinstance(estimates, (list, tuple)) else [estimates]
+@dataclass(frozen=True)
+class _Scans:
+    """Exponents of the scans, their errors, 3 (of profiles 2), the scales of the fits.
+
+    Of surfaces also the distribution of each exponent, and by how much gridding may have raised it.
+    """
+
+    hurst: Array
+    error: Array
+    whole: Array
+    scale_min: Array
+    scale_max: Array
+    posteriors: list[Any]
+    too_high: Array
+
+
+def _of_results(results: list[xr.Dataset], method: str | None) -> _Scans:
+    chosen = [each.isel(method=0) if method is None else each.sel({"method": method}) for each in results]
+
+    def values(name: str) -> Array:
+        return np.concatenate([np.asarray(each[name].values, dtype=float).ravel() for each in chosen])
+
+    hurst = values("hurst")
+    whole = np.rint(hurst + values("fractal_dimension"))
+    return _Scans(
+        hurst, values("standard_error"), whole, values("scale_min"), values("scale_max"), [], np.zeros(0)
+    )
+
+
+def _of_surfaces(surfaces: list[xr.DataArray]) -> _Scans:
+    singles = [single for surface in surfaces for single in read_surfaces(surface)]
+    records = [likelihood(single, None, None) for single in singles]
+    gridded = [
+        record.gridded(single.finest_scale) if single.finest_scale else record
+        for single, record in zip(singles, records, strict=True)
+    ]
+    return _Scans(
+        np.array([record.hurst for record in records]),
+        np.array([record.standard_error for record in records]),
+        np.array([1.0 + single.axes for single in singles]),
+        np.array([record.scale_min for record in records]),
+        np.array([record.scale_max for record in records]),
+        [record.posterior for record in records],
+        np.array([a.ci_low - b.ci_low for a, b in zip(records, gridded, strict=True)]),
+    )

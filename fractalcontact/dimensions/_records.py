@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from fractalcontact.base.units import quantity_text
+from fractalcontact.dimensions._spectral_posterior import Posterior
 
 SIGNIFICANT = 3.3  # |z| beyond which a misfit widens the interval: one in a thousand by chance
 CONSTANT = "a constant height has no Hurst exponent"
@@ -39,6 +40,8 @@ class Estimate:
         How the window was chosen, why there is no interval, other remarks.
     fitted_hurst : float
         The exponent before it was limited.
+    posterior : Posterior, optional
+        Distribution of the exponent, of the method "likelihood".
     """
 
     hurst: float
@@ -55,6 +58,7 @@ class Estimate:
     reason: str = ""
     note: str = ""
     fitted_hurst: float = np.nan
+    posterior: Posterior | None = field(default=None, repr=False, compare=False)
 
     def without_interval(self, reason: str) -> Estimate:
         """Return the estimate without its standard error and interval."""

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -60,6 +61,7 @@ _OCTAVE = math.log(2.0)
 
 _STARTS, _ATTEMPTS, _STEPS = 64, 5, 12
 _FLAT = 1e3  # variance of ln A
+_GRID, _ZOOMS, _NEGLIGIBLE = 2001, 5, 20.0  # of a product of densities: points, refinements, log density
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,12 @@ class Posterior:
             low, high = (middle, high) if below < share else (low, middle)
         return LOWEST + (HIGHEST - LOWEST) * float(ndtr(low))
 
+    def log_density(self, u: Array) -> Array:
+        """Return the logarithm of the density of u."""
+        share, centre, scale = (each.ravel()[:, None] for each in (self.share, self.centre, self.scale))
+        density = np.exp(-0.5 * np.square((u - centre) / scale)) / scale
+        return np.asarray(np.log((share * density).sum(axis=0) + 1e-300) - 0.5 * math.log(2.0 * math.pi))
+
     @property
     def most_probable(self) -> tuple[Hypothesis, Discrepancy, Array]:
         """Hypothesis, discrepancy and theta of the largest share."""
@@ -160,6 +168,24 @@ class Posterior:
         return float(
             np.sum(self.share[chosen] * self.theta[chosen, :, parameter]) / np.sum(self.share[chosen])
         )
+
+
+def joint_quantiles(posteriors: Sequence[Posterior], shares: Sequence[float]) -> list[float]:
+    """Return quantiles of the H that independent surfaces have in common, each with nuisances of its own.
+
+    Their product has the prior of u, the unit normal distribution, once.
+    """
+    from scipy.special import ndtr
+
+    low, high = -8.0, 8.0
+    for _ in range(_ZOOMS):
+        u = np.linspace(low, high, _GRID)
+        log = sum(each.log_density(u) for each in posteriors) + 0.5 * (len(posteriors) - 1) * np.square(u)
+        near = np.flatnonzero(log > log.max() - _NEGLIGIBLE)
+        low, high = u[max(near[0] - 1, 0)], u[min(near[-1] + 1, u.size - 1)]
+    density = np.exp(log - log.max())
+    found = np.interp(np.asarray(shares) * density.sum(), np.cumsum(density) - 0.5 * density, u)
+    return [LOWEST + (HIGHEST - LOWEST) * float(ndtr(each)) for each in found]
 
 
 def hypotheses(spread: float | None, noise: float | None, background: float) -> list[Hypothesis]:

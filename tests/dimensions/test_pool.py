@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -78,8 +79,77 @@ def test_resolutions_of_one_surface_are_pooled():
     assert pooled.scale_min == each["1"].scale_min.item()
 
 
+BLUR, NOISE = 0.7, 0.05  # spacings; rms increments
+
+
+def twin(hurst, seed):
+    """One surface at three resolutions, 64 x 64 points each: all of it, a quarter, a 64th."""
+    rng, spacing, scans = np.random.default_rng([seed, 7]), 1e-6, []
+    fine = fc.surfaces.fbm((512, 512), spacing, hurst=hurst, rms_increment=1e-7, rng=seed).values
+    for step, start, extent in ((8, 0, 512), (4, 128, 256), (1, 200, 64)):
+        cut = slice(start, start + extent, step)
+        seen = gaussian_filter(fine, BLUR * step, mode="nearest")[cut, cut]
+        noise = NOISE * np.diff(seen).std() * rng.standard_normal(seen.shape)
+        scans.append(fc.surfaces.from_array(seen + noise, spacing * step))
+    return scans
+
+
+def common_of(hurst, seeds):
+    """Return how many intervals of the common exponent hold it, and how many scans disagreed."""
+    held, disagreed = 0, 0
+    for seed in seeds:
+        pooled = fc.dimensions.pool(twin(hurst, seed), model="common")
+        held += bool(pooled.ci_low <= hurst <= pooled.ci_high)
+        disagreed += bool(pooled.reason)
+    return held, disagreed
+
+
+def test_common_exponent_of_one_surface_at_three_resolutions():
+    assert common_of(0.6, range(4)) == (4, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hurst", [0.3, 0.5, 0.8])
+def test_interval_of_a_common_exponent_covers(hurst):
+    held, disagreed = common_of(hurst, range(60))
+    assert held >= 51  # 57 are expected; fewer than 51 have a chance below 0.005
+    assert disagreed <= 2
+
+
+def test_common_interval_is_shorter_than_those_of_the_scans_and_of_random_effects():
+    scans = twin(0.6, 1)
+    each = [fc.dimensions.estimate(scan) for scan in scans]
+    common = fc.dimensions.pool(scans, model="common")
+    width = float(common.ci_high - common.ci_low)
+    assert width < min(float((one.ci_high - one.ci_low).item()) for one in each)
+    random = fc.dimensions.pool(each)
+    assert width < float(random.ci_high - random.ci_low)
+    assert common.within_scans == random.within_scans
+
+
+def test_common_exponent_of_one_scan_is_its_own():
+    scan = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.7, rms_increment=1e-6, rng=2)
+    alone, common = fc.dimensions.estimate(scan), fc.dimensions.pool([scan], model="common")
+    for name in ("hurst", "ci_low", "ci_high"):
+        assert float(common[name]) == pytest.approx(float(alone[name].item()), abs=2e-5)
+
+
+def test_scans_of_other_exponents_have_no_common_one():
+    scans = [fc.surfaces.fbm((128, 128), 1e-4, hurst=h, rms_increment=1e-6, rng=3) for h in (0.3, 0.3, 0.8)]
+    common = fc.dimensions.pool(scans, model="common")
+    assert np.isnan(common.ci_low)
+    assert "scatter more" in str(common.reason.values)
+
+
+def test_a_common_exponent_needs_surfaces():
+    with pytest.raises(InvalidInput, match="scans: expected surfaces"):
+        fc.dimensions.pool(estimates_of([0.7], [0.1]), model="common")
+    with pytest.raises(InvalidInput, match="model: expected one of"):
+        fc.dimensions.pool(estimates_of([0.7], [0.1]), model="fixed")
+
+
 def test_other_results_are_refused():
-    with pytest.raises(InvalidInput, match="estimates: expected results of"):
+    with pytest.raises(InvalidInput, match="scans: expected results of"):
         fc.dimensions.pool([xr.Dataset()])
     with pytest.raises(InvalidInput, match="method: expected one of"):
         fc.dimensions.pool(estimates_of([0.7], [0.1]), method="spectrum")
