@@ -10,20 +10,11 @@ import numpy as np
 
 from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.plotting import _style
+from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel
-from fractalcontact.plotting._paths import (
-    PATH,
-    at_shear,
-    by_load,
-    by_shear,
-    load_of,
-    loads_of,
-    path_axis,
-    shear_text,
-)
+from fractalcontact.plotting._paths import PATH
 from fractalcontact.plotting._style import Axes, AxesArray, Panels, needs_log_axis
 from fractalcontact.plotting._units import PER_CENT, Quantity, Units, name_of, scale_of
 
@@ -74,9 +65,9 @@ def contact_area(
     nominal pressure (MPa) | real / nominal contact area (%)
     """
     data = result_of(result, "contact_area", ("contact_fraction", against), PATH, units)
-    loads = loads_of(data, against, "contact_area")
+    loads = _paths.loads_of(data, against, "contact_area")
     cells = quantity(data, "contact_fraction", PATH, "real / nominal contact area")
-    panel = LinePanel(_style.axes_or_new(ax), loads, cells, by_shear(data))
+    panel = LinePanel(_style.axes_or_new(ax), loads, cells, _paths.by_shear(data))
     if "corrected_contact_fraction" in data:
         fraction = table(data, "corrected_contact_fraction", PATH)
         name = "corrected for the perimeter"
@@ -158,7 +149,7 @@ def path(
     names = (variable,) if isinstance(variable, str) else tuple(variable)
     given = () if against is None else (against,)
     data = result_of(result, "path", (*names, *given), PATH, units)
-    dims, x, family = path_axis(data, against, "path")
+    dims, x, family = _paths.path_axis(data, against, "path")
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
     y = quantity(data, names[0], dims, title, np.array(values))
@@ -170,7 +161,9 @@ def path(
             low, high = (table(data, f"{name}_{end}", dims)[0] for end in ("low", "high"))
             panel.band(f"{title}, interval", x.values[0], low, high, family.styles[0]["color"])
     if theory is not None:
-        _draw_theories(panel, theory, "path", OF_THEORY.get(names[0], names[0]), against or load_of(data))
+        _draw_theories(
+            panel, theory, "path", OF_THEORY.get(names[0], names[0]), against or _paths.load_of(data)
+        )
     wide = "".join(
         axis for axis, shown in (("x", x.values), ("y", np.array(values))) if needs_log_axis(shown)
     )
@@ -221,7 +214,7 @@ def pressure_distribution(
         spread = float(
             result_of(theory, "pressure_distribution", ("pressure_spread",), ())["pressure_spread"]
         )
-    family = by_load(data.drop_vars("normal_force", errors="ignore"))
+    family = _paths.by_load(data.drop_vars("normal_force", errors="ignore"))
     panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=0)
     for i in np.flatnonzero(greatest > 0).tolist():
         own, pressure = family.styles[i], x.values[i]
@@ -271,15 +264,17 @@ def area_dimension(
     """
     names = ("contact_fraction", "corrected_contact_fraction", "resolution")
     result = result_of(result, "area_dimension", names, ("shear", "step", "resolution"), units)
-    data, dims = at_shear(result, shear), ("step", "resolution")
+    data, dims = _paths.at_shear(result, shear), ("step", "resolution")
     spacing = quantity(data, "resolution", ("resolution",), "spacing")
     cells = quantity(data, "contact_fraction", dims)
-    panel = LinePanel(_style.axes_or_new(ax), spacing, cells, by_load(data), points=_style.MAX_MARKED_POINTS)
+    panel = LinePanel(
+        _style.axes_or_new(ax), spacing, cells, _paths.by_load(data), points=_style.MAX_MARKED_POINTS
+    )
     panel.curves("cells", spacing.values, cells.values, key="cells", marker="o")
     corrected = table(data, "corrected_contact_fraction", dims)
     name = "corrected for the perimeter"
     panel.curves(name, spacing.values, corrected, key=name, marker="s", ms=3.5, **_style.DASHED)
-    panel.ax.set_title(shear_text(data))
+    panel.ax.set_title(_paths.shear_text(data))
     panel.finish(log="xy")
     panel.ax.set_xticks(spacing.shown, [f"{value:g}" for value in spacing.shown])
     panel.ax.set_xticks([], minor=True)
@@ -320,7 +315,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     sticking = Quantity(share, PER_CENT, "part of the contact that sticks")
     shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1))
     for ax, x, y in zip(shown, (displacement, force), (force, sticking), strict=True):
-        panel = LinePanel(ax, x, y, by_shear(data), points=_style.MAX_MARKED_POINTS)
+        panel = LinePanel(ax, x, y, _paths.by_shear(data), points=_style.MAX_MARKED_POINTS)
         panel.curves("loading path", x.values, y.values)
         panel.finish(legend=y is sticking)
     shown[1].set_ylim(0, 105)

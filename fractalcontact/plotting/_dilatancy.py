@@ -7,18 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.plotting import _style
+from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._closure import mark_points
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import nearest, quantity, result_of, table, words
 from fractalcontact.plotting._line_panel import Family, LinePanel, distinct
-from fractalcontact.plotting._paths import (
-    by_direction,
-    by_load,
-    direction_name,
-    limit_shear,
-    select_direction,
-)
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
@@ -65,8 +58,8 @@ def dilatancy(
     >>> print(ax.get_ylabel(), "|", len(ax.lines), "curves")
     dilatancy $\delta$ (µm) | 3 curves
     """
-    data = select_direction(dilatancy, direction, "dilatancy", units, "dilatancy")
-    data = limit_shear(data, reach)
+    data = _paths.select_direction(dilatancy, direction, "dilatancy", units, "dilatancy")
+    data = _paths.limit_shear(data, reach)
     if "dilatancy" in data:
         return _of_elastic_bodies(data, marked, ax)
     return _of_rigid_surfaces(data, ax)
@@ -76,7 +69,7 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     dims = ("direction", "shear")
     data = result_of(data, "dilatancy", ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
     shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "rigid_dilatancy", dims)
-    panel = LinePanel(_style.axes_or_new(ax), shear, opening, by_direction(data))
+    panel = LinePanel(_style.axes_or_new(ax), shear, opening, _paths.by_direction(data))
     panel.curves("rigid dilatancy", shear.values, opening.values)
     if "mean_slope" in data:
         ends = np.array([0.0, np.nanmax(shear.values)])
@@ -89,7 +82,7 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
 def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> Axes:
     data = result_of(data, "dilatancy", ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
     shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "dilatancy", ("step", "shear"))
-    loads, points = by_load(data), _style.MAX_MARKED_POINTS
+    loads, points = _paths.by_load(data), _style.MAX_MARKED_POINTS
     panel = LinePanel(_style.axes_or_new(ax), shear, opening, loads, points)
     panel.curves("dilatancy", shear.values, opening.values)
     if "rigid_dilatancy" in data:
@@ -97,7 +90,7 @@ def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> A
         panel.line("rigid", shear.values, table(data, "rigid_dilatancy", ("shear",)), **style)
         panel.family = Family([style, *loads.styles], ["0 (rigid)", *loads.labels], loads.name, loads.unit)
     if "direction" in data.coords:
-        panel.ax.set_title(f"block slides {direction_name(words(data['direction'])[0])}")
+        panel.ax.set_title(f"block slides {_paths.direction_name(words(data['direction'])[0])}")
     for number, target in enumerate(marked):
         index = nearest(shear.values, target)
         if np.isclose(shear.values[index], target, rtol=1e-6, atol=0.0):
@@ -139,7 +132,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
         quantity(data, "shear", ("shear",)),
         quantity(data, "correlation", dims, "correlation of the faces"),
     )
-    panel = LinePanel(_style.axes_or_new(ax), shear, values, by_direction(data), points=0)
+    panel = LinePanel(_style.axes_or_new(ax), shear, values, _paths.by_direction(data), points=0)
     panel.curves("", shear.values, values.values)
     ends = [table(data.isel(shear=0), name, ("direction",)) for name in LENGTHS]
     for own, low, length, high in zip(panel.family.styles, *ends, strict=True):

@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.units import Scale
-from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import (
     as_dataset,
@@ -21,18 +21,7 @@ from fractalcontact.plotting._inputs import (
     table,
 )
 from fractalcontact.plotting._line_panel import Family, LinePanel
-from fractalcontact.plotting._paths import (
-    PATH,
-    at_force,
-    at_shear,
-    by_load,
-    by_shear,
-    load_of,
-    load_text,
-    loaded_steps,
-    loads_of,
-    shear_text,
-)
+from fractalcontact.plotting._paths import PATH
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units
 
@@ -183,8 +172,10 @@ def lacunarity(
     shown = path_panels(axes, data)
     if maps:
         for ax, dim, path, _, text in _chosen_paths(data, shear, normal_force, shown, None):
-            name = "shear" if dim == "shear" else load_of(path)
-            along = loads_of(path.expand_dims([d for d in PATH if d != dim]), name, "lacunarity", _first(dim))
+            name = "shear" if dim == "shear" else _paths.load_of(path)
+            along = _paths.loads_of(
+                path.expand_dims([d for d in PATH if d != dim]), name, "lacunarity", _first(dim)
+            )
             places = Quantity(along.values[0], along.scale, along.name)
             colours = quantity(path, "lacunarity", (dim, "box_size"))
             _maps.draw_heat_map(ax, places, sizes_of(path, "box_size"), colours)
@@ -219,12 +210,16 @@ def _chosen_paths(
 ) -> Iterator[tuple[Axes, str, xr.Dataset, Family, str]]:
     """Yield for each panel its dim, the states along it (at most `most`), their family and its title."""
     for dim, ax in shown.items():
-        path = at_shear(data, shear) if dim == "step" else at_force(data, force)
-        text = shear_text(path, data) if dim == "step" else load_text(path, data)
+        path = _paths.at_shear(data, shear) if dim == "step" else _paths.at_force(data, force)
+        text = _paths.shear_text(path, data) if dim == "step" else _paths.load_text(path, data)
         count = path.sizes[dim] if most is None else most
-        chosen = loaded_steps(path, count) if dim == "step" else _style.spread_indices(path.sizes[dim], count)
+        chosen = (
+            _paths.loaded_steps(path, count)
+            if dim == "step"
+            else _style.spread_indices(path.sizes[dim], count)
+        )
         path = path.isel({dim: chosen})
-        yield ax, dim, path, by_load(path) if dim == "step" else by_shear(path), text
+        yield ax, dim, path, _paths.by_load(path) if dim == "step" else _paths.by_shear(path), text
 
 
 def _size_curves(
@@ -297,14 +292,14 @@ def box_dimension(
     dataset = as_dataset(result, "box_dimension")
     present = [name for name in DIMENSIONS if name in dataset]
     data = result_of(dataset, "box_dimension", (present or DIMENSIONS)[:1], PATH, units)
-    shown, shears = path_panels(axes, data), by_shear(data)
+    shown, shears = path_panels(axes, data), _paths.by_shear(data)
     first, *_, last = (*shown.values(), *shown.values())
     for dim, ax in shown.items():
         if dim == "step":
             panel = _draw_dimension(ax, data, present[0], PATH, shears)
         else:
-            path = at_force(data, normal_force)
-            load = load_text(path, data)
+            path = _paths.at_force(data, normal_force)
+            load = _paths.load_text(path, data)
             family = Family([{"color": _style.ink()}], [load] if load else [])
             panel = _draw_dimension(ax, path.expand_dims("step"), present[0], PATH[::-1], family)
             ax.set_title(load)
@@ -321,8 +316,8 @@ def _draw_dimension(
     ax: Axes, path: xr.Dataset, name: str, dims: tuple[str, str], family: Family
 ) -> LinePanel:
     """Draw one curve for each of the family with its random null, its points and, if alone, its interval."""
-    load = "shear" if dims[1] == "shear" else load_of(path) or "coverage"
-    x, y = loads_of(path, load, "box_dimension", dims), quantity(path, name, dims)
+    load = "shear" if dims[1] == "shear" else _paths.load_of(path) or "coverage"
+    x, y = _paths.loads_of(path, load, "box_dimension", dims), quantity(path, name, dims)
     panel = LinePanel(ax, x, y, family, points=0)
     reliable, described = np.full(y.values.shape, True), "interval wider than 0.5, or none"
     panel.key("contact domain", marker="o")

@@ -8,18 +8,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.units import quantity_text
-from fractalcontact.plotting import _style
+from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel, distinct, ordered
-from fractalcontact.plotting._paths import (
-    by_direction,
-    by_load,
-    by_shear,
-    direction_name,
-    limit_shear,
-    select_direction,
-)
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, number_texts, scale_of
 
@@ -179,16 +171,19 @@ def friction(
     >>> print(ax.get_ylabel())
     friction angle (°)
     """
-    selected = limit_shear(select_direction(result, None, "friction", units), reach)
+    selected = _paths.limit_shear(_paths.select_direction(result, None, "friction", units), reach)
     names = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
     by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
     over = "step" if by_force else "direction"
     if by_force or direction is not None:
-        selected = select_direction(selected, direction, "friction")
+        selected = _paths.select_direction(selected, direction, "friction")
     data = result_of(selected, "friction", (*names, "shear"), ("shear", over))
     size = (_style.WIDTH if len(names) > 1 else _style.PANEL[0], 3.1)
     shown = _style.panel_row(axes, len(names), size, sharex=True)
-    shear, family = quantity(data, "shear", ("shear",)), by_load(data) if by_force else by_direction(data)
+    shear, family = (
+        quantity(data, "shear", ("shear",)),
+        _paths.by_load(data) if by_force else _paths.by_direction(data),
+    )
     for ax, name in zip(shown, names, strict=True):
         values = quantity(data, name, (over, "shear"))
         panel = LinePanel(ax, shear, values, family, points=_style.MAX_MARKED_POINTS)
@@ -202,7 +197,7 @@ def friction(
         panel.finish(log="y" if is_wide else "", legend=name == names[-1])
     remarks = []
     if by_force and "direction" in data.coords:
-        remarks.append(f"block slides {direction_name(words(data['direction'])[0])}")
+        remarks.append(f"block slides {_paths.direction_name(words(data['direction'])[0])}")
     if shown[0].get_ylim()[1] > LOCKED:
         shown[0].set_ylim(top=LOCKED)
         remarks.append(f"locked above {LOCKED:g}°")
@@ -247,8 +242,8 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     dims = ("shear", "direction", "structure_size")
     data = result_of(result, "self_weight", names, dims, units)
     size = quantity(data, "structure_size", ("structure_size",), "size of the structure")
-    strength, shears = quantity(data, "shear_strength", dims), by_shear(data)
-    panel = LinePanel(_style.axes_or_new(ax), size, strength, by_direction(data), points=1)
+    strength, shears = quantity(data, "shear_strength", dims), _paths.by_shear(data)
+    panel = LinePanel(_style.axes_or_new(ax), size, strength, _paths.by_direction(data), points=1)
     for i, values in enumerate(strength.values):
         line = _style.LINES[i % 3]
         key = shears.labels[i] if shears.labels else ""

@@ -6,20 +6,9 @@ import inspect
 import re
 from collections.abc import Mapping
 
+from fractalcontact.scenes import _scene_keys
 from fractalcontact.scenes._functions import public_function
-from fractalcontact.scenes._scene_keys import (
-    EVEN,
-    LOGARITHMIC,
-    LONGEST_RANGE,
-    OF_JOINT,
-    TITLE,
-    Keys,
-    Schema,
-    keys_of,
-    keys_of_stage,
-    number,
-    surface_forms,
-)
+from fractalcontact.scenes._scene_keys import Keys, Schema
 from fractalcontact.scenes._stage_type import StageType
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -96,7 +85,7 @@ def json_schema() -> Schema:
     return {
         "$schema": DRAFT,
         "title": "Scene of fractalcontact",
-        **_table(_described({"title": TITLE.schema}, OWN) | tables, {}),
+        **_table(_described({"title": _scene_keys.TITLE.schema}, OWN) | tables, {}),
         "required": ["want"],
         "anyOf": [{"required": ["surface"]}, {"required": ["joint"]}],
         "definitions": dict(zip(("even_range", "logarithmic_range"), _ranges(), strict=True)),
@@ -116,10 +105,13 @@ def _described(properties: Mapping[str, Schema], texts: Mapping[str, str]) -> di
 
 
 def _ranges() -> list[Schema]:
-    even, logarithmic = ({word: number().schema for word in words} for words in (EVEN, LOGARITHMIC))
-    positive = number(above=0.0).schema
+    even, logarithmic = (
+        {word: _scene_keys.number().schema for word in words}
+        for words in (_scene_keys.EVEN, _scene_keys.LOGARITHMIC)
+    )
+    positive = _scene_keys.number(above=0.0).schema
     even |= {"step": positive}
-    count = number(at_least=1, below=LONGEST_RANGE).schema | {"multipleOf": 1}
+    count = _scene_keys.number(at_least=1, below=_scene_keys.LONGEST_RANGE).schema | {"multipleOf": 1}
     logarithmic |= {"first": positive, "last": positive, "count": count}
     return [_table(words, {}) | {"required": list(words)} for words in (even, logarithmic)]
 
@@ -127,7 +119,7 @@ def _ranges() -> list[Schema]:
 def _surface(place: str) -> Schema:
     """Return the table of a surface: one form for files, one for samples, one for each generator."""
     tables = []
-    for form, keys in surface_forms(place).items():
+    for form, keys in _scene_keys.surface_forms(place).items():
         if form in ("read", "sample"):
             texts = parameter_texts("surfaces.read") | OWN
         else:
@@ -142,10 +134,12 @@ def _of_keys(keys: Keys, texts: Mapping[str, str]) -> Schema:
 
 def _with_stages(name: str) -> Schema:
     """Return a table with keys of its own and a table for each of its stages."""
-    keys = keys_of(name)
+    keys = _scene_keys.keys_of(name)
     properties = {key: kind.schema for key, kind in keys.kinds.items()}
     for word, row in keys.stages.items():
-        table = _of_keys(keys_of_stage(row), {"block": OWN["block"]} | parameter_texts(row.function))
+        table = _of_keys(
+            _scene_keys.keys_of_stage(row), {"block": OWN["block"]} | parameter_texts(row.function)
+        )
         table["description"] = f"Arguments of fractalcontact.{row.function}."
         own = properties.get(word)  # [joint.closure] is a stage, closure = 1e-6 a load
         properties[word] = table if own is None else {"anyOf": [*own.get("anyOf", [own]), table]}
@@ -160,7 +154,7 @@ def _texts(name: str, stages: Mapping[str, StageType]) -> dict[str, str]:
         shared: dict[str, str] = {}
         for row in stages.values():
             shared = parameter_texts(row.function) | shared
-        return shared | {key: OWN[key] for key in ("block", *OF_JOINT)}
+        return shared | {key: OWN[key] for key in ("block", *_scene_keys.OF_JOINT)}
     return parameter_texts(FUNCTIONS[name]) if name in FUNCTIONS else {}
 
 

@@ -12,17 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base import provenance
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.netcdf import as_dataset
-from fractalcontact.base.provenance import (
-    checksum,
-    file_checksum,
-    load_of,
-    member_count,
-    member_entry,
-    with_provenance,
-)
 from fractalcontact.base.references import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import public_function
@@ -80,14 +73,14 @@ def reproduce(
         is_result = isinstance(attributes, Mapping) and bool(provenance_of(result))
         if problems.require(is_result, "result", expected, type(result).__name__) and is_path:
             entry = provenance_of(result)
-            count = member_count(entry)
+            count = provenance.member_count(entry)
             if count is None:
                 problems.integer("member", member, at_least=0, at_most=0, optional=True)
             else:
                 problems.integer("member", member, at_least=0, at_most=count - 1)
     source = _Source(Path(folder))
     if count is not None and member is not None:
-        entry = member_entry(entry, member)
+        entry = provenance.member_entry(entry, member)
     made = source.make(entry)
     for other in entry.get("merged", ()):  # a group that holds the results of several calls
         made = made.assign(source.make(other).data_vars)
@@ -110,7 +103,7 @@ class _Source:
             arguments["path"] = self._file(str(arguments["path"]), entry["file_sha256"])
         if "sections" not in entry:
             return _call(function, arguments)
-        load = load_of(entry)[0]
+        load = provenance.load_of(entry)[0]
         ends = np.cumsum(entry["sections"])[:-1].tolist()
         path = arguments.pop(load)
         sections = [path[start:end] for start, end in zip([0, *ends], [*ends, None], strict=True)]
@@ -148,9 +141,9 @@ class _Source:
             return made
         if summary["name"] not in made:  # a single array that has been renamed since
             made = made.rename({next(iter(made.data_vars)): summary["name"]})
-        array = with_provenance(made, summary["name"])
+        array = provenance.with_provenance(made, summary["name"])
         stated = summary.get("sha256")
-        if isinstance(stated, str) and stated != checksum(np.asarray(array.values)):
+        if isinstance(stated, str) and stated != provenance.checksum(np.asarray(array.values)):
             message = (
                 f"{WHERE}: {name} differs from the array of the provenance (other versions of libraries?)"
             )
@@ -161,7 +154,7 @@ class _Source:
         """Return a file that was read, from the folder or from the shipped data, if it is the same."""
         places = [path for path in (self.folder / name, datasets_folder() / name) if path.is_file()]
         for path in places:
-            if file_checksum(path) == stated:
+            if provenance.file_checksum(path) == stated:
                 return path
         got = "one of another content (SHA-256)" if places else "no such file"
         raise InvalidInput(WHERE, [f"folder: expected the file {name!r} that was read, got {got}"])

@@ -22,6 +22,7 @@ from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
 from fractalcontact.base.references import joined_references, provenance_of
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
+from fractalcontact.scenes import _results_folder
 from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
@@ -29,15 +30,6 @@ from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
 from fractalcontact.scenes._result_tables import MEMBER, of_member
-from fractalcontact.scenes._results_folder import (
-    CSV,
-    DATASHEET,
-    REPORT,
-    SOFTWARE,
-    TABLES,
-    remove_old_figures,
-    results_folder,
-)
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene
@@ -142,7 +134,7 @@ def run(
         if not scans:
             check_memory(scene, stages_of(scene), workers)
         among = workers_of(processes if client is None else client)
-        with results_folder(out, scene, force=force) as folder:
+        with _results_folder.results_folder(out, scene, force=force) as folder:
             if scans:
                 tree, whole = _run_scans(scene, scans, folder, progress, among, start)
             else:
@@ -181,13 +173,13 @@ def _run_scans(
         netcdf.save(tree, folder / RESULT)
         with _beside_the_result():
             frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
-            with netcdf.written_whole(folder / CSV) as temporary:
+            with netcdf.written_whole(folder / _results_folder.CSV) as temporary:
                 frame.to_csv(temporary, index=False)
             overview = xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
             figures = _draw(overview, folder, progress) if scene.want.figures and studies.numbers else []
-            remove_old_figures(folder, figures)
+            _results_folder.remove_old_figures(folder, figures)
             whole = summary_of(tree)
-            write_report(tree, folder / REPORT, figures, whole)
+            write_report(tree, folder / _results_folder.REPORT, figures, whole)
         failed = sum(map(bool, studies.reasons.values()))
         if failed:
             message = f"{failed} of {len(scans)} scans failed or are incomplete; the table states why"
@@ -263,15 +255,15 @@ def _run(
         if scene.want.figures:
             figures = _draw(tree, folder, progress)
             _note_run_time(tree, start)
-            remove_old_figures(folder, figures)
+            _results_folder.remove_old_figures(folder, figures)
         whole = summary_of(tree)
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         netcdf.replace_attributes(folder / RESULT, changed)
-        write_report(tree, folder / REPORT, figures, whole)
+        write_report(tree, folder / _results_folder.REPORT, figures, whole)
         if scene.want.datasheet and not failed:
-            tables(tree, folder / TABLES)
-            _draw_datasheet(tree, folder / DATASHEET)
+            tables(tree, folder / _results_folder.TABLES)
+            _draw_datasheet(tree, folder / _results_folder.DATASHEET)
     if not failed:
         store.clear()
     return tree, whole
@@ -416,7 +408,9 @@ def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
     first, page = of_member(tree, 0), Figure()
     with DRAWING_LOCK, netcdf.written_whole(target) as temporary:
         plotting.datasheet(first, notes=caveats(first), figure=page)
-        page.savefig(temporary, format="pdf", metadata={"CreationDate": None, "Creator": SOFTWARE})
+        page.savefig(
+            temporary, format="pdf", metadata={"CreationDate": None, "Creator": _results_folder.SOFTWARE}
+        )
 
 
 @contextmanager

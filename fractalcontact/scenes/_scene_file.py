@@ -16,23 +16,10 @@ from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.units import pascals
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
+from fractalcontact.scenes import _scene_keys
 from fractalcontact.scenes._plan import check_needs, stages_of
 from fractalcontact.scenes._scene import MATERIAL_KEYS, Scene, Table
-from fractalcontact.scenes._scene_keys import (
-    ANYTHING,
-    EVEN,
-    GENERATORS,
-    LOGARITHMIC,
-    LONGEST_RANGE,
-    PRESSURES,
-    SPELLINGS,
-    TABLES,
-    TITLE,
-    Keys,
-    keys_of,
-    keys_of_stage,
-    surface_forms,
-)
+from fractalcontact.scenes._scene_keys import Keys
 from fractalcontact.scenes._stages import PARTIAL_SLIP, STAGES
 
 LARGEST_FILE = 1 << 20  # bytes
@@ -129,7 +116,7 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
             own = tables.get(name)
             tables[name] = {"read": tables["joint"][key], **(own if isinstance(own, dict) else {})}
             tables["joint"] = {other: tables["joint"][other] for other in tables["joint"] if other != key}
-    for name in TABLES:
+    for name in _scene_keys.TABLES:
         if not isinstance(tables.get(name, {}), dict):
             problems.add(name, "a table", tables[name])
             tables[name] = {}
@@ -178,17 +165,17 @@ def _in_plain_words(value: Any, key: str) -> Any:
         return [_in_plain_words(item, key) for item in value]
     if not isinstance(value, str):
         return value
-    if key in PRESSURES:
+    if key in _scene_keys.PRESSURES:
         pressure = pascals(value)
         return value if pressure is None else pressure
-    return SPELLINGS.get(key, {}).get(value, value)
+    return _scene_keys.SPELLINGS.get(key, {}).get(value, value)
 
 
 def _expand_ranges(value: Any, key: str, problems: Problems) -> Any:
     """Replace the ranges {start, stop, step} and {first, last, count} (logarithmic) by lists."""
     if not isinstance(value, dict):
         return value
-    for words in (EVEN, LOGARITHMIC):
+    for words in (_scene_keys.EVEN, _scene_keys.LOGARITHMIC):
         if value and set(value) <= set(words):
             return _range(value, words, key, problems)
     return {word: _expand_ranges(item, f"{key}.{word}", problems) for word, item in value.items()}
@@ -206,13 +193,13 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
     if not all(checks):
         return value
     low, high, number = (float(value[word]) for word in words)
-    if words is EVEN:
-        valid = number > 0 and high >= low and (high - low) / number < LONGEST_RANGE
+    if words is _scene_keys.EVEN:
+        valid = number > 0 and high >= low and (high - low) / number < _scene_keys.LONGEST_RANGE
         expected = "a range with step > 0, stop >= start and at most 10^6 entries"
         if not problems.require(valid, key, expected, value):
             return value
         return [low + number * index for index in range(round((high - low) / number) + 1)]
-    valid = low > 0 and high > 0 and 1 <= number < LONGEST_RANGE and number == int(number)
+    valid = low > 0 and high > 0 and 1 <= number < _scene_keys.LONGEST_RANGE and number == int(number)
     expected = "a logarithmic range with first, last > 0 and an integer count >= 1"
     if not problems.require(valid, key, expected, value):
         return value
@@ -221,13 +208,18 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
 
 def _check(scene: Scene, problems: Problems) -> None:
     """Check all tables; the keys of one are looked up, which imports functions, only where there is one."""
-    _check_table(scene.tables, Keys({"title": TITLE} | dict.fromkeys(TABLES, ANYTHING)), "", problems)
-    for name in TABLES:
+    _check_table(
+        scene.tables,
+        Keys({"title": _scene_keys.TITLE} | dict.fromkeys(_scene_keys.TABLES, _scene_keys.ANYTHING)),
+        "",
+        problems,
+    )
+    for name in _scene_keys.TABLES:
         if name == "surface" or (name == "upper" and name in scene.tables):
             _check_surface(scene.table(name), name, problems)
         elif name in scene.tables:
             table = scene.table(name)
-            _check_table(table, keys_of(name, table), name, problems)
+            _check_table(table, _scene_keys.keys_of(name, table), name, problems)
     if not scene.table("want"):
         problems.add("want", "a table that names at least one result", NONE)
     if not any(argument.startswith("want") for argument in problems.arguments):
@@ -236,13 +228,13 @@ def _check(scene: Scene, problems: Problems) -> None:
 
 
 def _check_surface(table: Table, name: str, problems: Problems) -> None:
-    forms = surface_forms(name)
+    forms = _scene_keys.surface_forms(name)
     sources = [source for source in ("read", "sample", "generate") if source in table]
     form = sources[0] if len(sources) == 1 else ""
     if not form:
         problems.add(name, "one of `read`, `sample` or `generate`", sources or NONE)
     elif form == "generate":
-        is_known = problems.choice(f"{name}.generate", table["generate"], GENERATORS)
+        is_known = problems.choice(f"{name}.generate", table["generate"], _scene_keys.GENERATORS)
         form = table["generate"] if is_known else ""
     if form:
         _check_table(table, forms[form], name, problems)
@@ -257,7 +249,7 @@ def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> Non
     for key, value in table.items():
         place = f"{name}.{key}" if name else key
         if isinstance(value, dict) and key in keys.stages:
-            _check_table(value, keys_of_stage(keys.stages[key]), place, problems)
+            _check_table(value, _scene_keys.keys_of_stage(keys.stages[key]), place, problems)
         elif key in keys.kinds:
             keys.kinds[key].check(problems, place, value)
         else:

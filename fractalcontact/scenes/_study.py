@@ -14,17 +14,11 @@ import xarray as xr
 from fractalcontact.base import signals
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
+from fractalcontact.scenes import _parts
 from fractalcontact.scenes._checkpoint import PartStore, digest
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._inputs import plane_share, surface_grid
-from fractalcontact.scenes._parts import (
-    PartWithReaders,
-    Precomputed,
-    StageWork,
-    map_reader,
-    stage_work,
-    without,
-)
+from fractalcontact.scenes._parts import PartWithReaders, Precomputed, StageWork
 from fractalcontact.scenes._plan import stages_of, stored_maps
 from fractalcontact.scenes._result_tables import MEMBER
 from fractalcontact.scenes._scene import Scene
@@ -122,7 +116,7 @@ class Study:
         tasks: dict[tuple[str, int], _PartTask] = {}
         for stage in (stage for stage in stages if not self._lacks(stage)):
             try:
-                self.works[stage.name] = stage_work(stage, self.scene, self.results, self.works)
+                self.works[stage.name] = _parts.stage_work(stage, self.scene, self.results, self.works)
                 tasks |= self._tasks(stage)
             except Exception as error:
                 self._fail(stage.name, error)
@@ -173,7 +167,7 @@ class Study:
     def _tasks(self, stage: Stage) -> dict[tuple[str, int], _PartTask]:
         """Return the missing parts of a stage, each with the stages that read its maps."""
         work, readers, dropped = self.works[stage.name], self._part_readers(stage), self._dropped_maps(stage)
-        functions = tuple(map_reader(reader, self.scene) for reader in readers)
+        functions = tuple(_parts.map_reader(reader, self.scene) for reader in readers)
         names = (stage.name, *(reader.name for reader in readers))
         for name in names:
             self._load_kept(name, len(work.parts))
@@ -213,7 +207,7 @@ class Study:
     def groups(self) -> dict[str, xr.Dataset]:
         """Return the wanted results of the finished stages, without the maps that only other stages read."""
         return {
-            stage.name: without(self.results[stage.name], self._internal_maps(stage))
+            stage.name: _parts.without(self.results[stage.name], self._internal_maps(stage))
             for stage in self.plan
             if stage.stored and stage.name in self.results
         }

@@ -23,14 +23,8 @@ from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.schema import label
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems, Words
+from fractalcontact.scenes import _inputs
 from fractalcontact.scenes._functions import arguments_of, parameters_of, public_function
-from fractalcontact.scenes._inputs import (
-    block_shape,
-    crack_options,
-    generator_options,
-    read_surface,
-    spacing_of,
-)
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scene import LOADS, PRESS, Scene, SurfaceTable
@@ -192,12 +186,12 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
             continue
         if generator := _generator(table):
             with _collected(problems, name, name):
-                _validate_call(f"surfaces.{generator}", **generator_options(table))
+                _validate_call(f"surfaces.{generator}", **_inputs.generator_options(table))
         if _is_valid(problems, name) and (name == "surface" or scene.want.joints):
             with problems.collect(f"{name}: "):
                 flat = _flat_surface(table)
                 lower = surfaces.get("surface")
-                made = read_surface(table, scene.folder, lower) if flat is None else flat
+                made = _inputs.read_surface(table, scene.folder, lower) if flat is None else flat
                 # a generator may reach sizes that float64 does not hold
                 if problems.surface(name, made, finite=False, smallest=1, leading=True):
                     surfaces[name] = made
@@ -265,7 +259,7 @@ def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Prob
 def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], row: StageType | None = None) -> Crack:
     """Return the crack of the scene, or that of a stage with a block of its own."""
     faces = surfaces["surface"], surfaces.get("upper")
-    crack: Crack = public_function("joints.Crack")(*faces, **crack_options(scene, row))
+    crack: Crack = public_function("joints.Crack")(*faces, **_inputs.crack_options(scene, row))
     return crack
 
 
@@ -343,8 +337,8 @@ def _empty_maps(
         return _empty_gap(scene, crack)
     if surface is None or not (scene.is_pressed or crack is not None):
         return None
-    spacing, shape = spacing_of(surface), (surface.sizes["y"], surface.sizes["x"])
-    cells = shape if scene.is_pressed else block_shape(scene, shape, spacing)
+    spacing, shape = _inputs.spacing_of(surface), (surface.sizes["y"], surface.sizes["x"])
+    cells = shape if scene.is_pressed else _inputs.block_shape(scene, shape, spacing)
     is_surface = scene.is_pressed or scene.joint.block is None
     periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
     maps = _zeros(cells, spacing, periodic)
@@ -373,7 +367,7 @@ def _rms_slope(heights: np.ndarray[Any, Any], spacing: tuple[float, float]) -> f
 
 def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
     """Yield the implausible values of a scene and its surface."""
-    spacing = spacing_of(surface)
+    spacing = _inputs.spacing_of(surface)
     slope = _rms_slope(distinct(surface.values), spacing)
     if slope > LARGEST_SLOPE:
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
