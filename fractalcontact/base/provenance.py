@@ -21,9 +21,9 @@ from fractalcontact.base import fft
 from fractalcontact.base import rng as streams
 from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import CONVENTIONS
+from fractalcontact.base.study import MEMBER
 from fractalcontact.base.threads import thread_count
 
-MEMBER = "member"
 LONGEST_TABLE = 64  # numbers of a table of more than one dim that are written
 LOADS = ("closure", "normal_force", "nominal_pressure")
 SHARED = "pressed"  # the argument of which every part takes what it needs: the whole is that of any part

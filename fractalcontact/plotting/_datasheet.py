@@ -10,11 +10,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.references import provenance_of
+from fractalcontact.base.study import group_of
 from fractalcontact.base.units import Scale, jrc_text, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure as checked
-from fractalcontact.plotting._inputs import group, quantity, table, words
+from fractalcontact.plotting._inputs import quantity, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, by_shear
 from fractalcontact.plotting._strength import shear_curve, strength_envelope
@@ -84,7 +85,7 @@ def datasheet(
     >>> [round(float(inches), 2) for inches in panels["strength"].figure.figure.get_size_inches()]
     [8.27, 11.69]
     """
-    found = {name: group(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
+    found = {name: group_of(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
     with Problems("fractalcontact.plotting.datasheet") as problems:
         expected = f"at least one of joints/{', joints/'.join(found)}"
         problems.require(any(data is not None for data in found.values()), "tree", expected, NONE)
@@ -135,7 +136,7 @@ def _draw_page(
 
 def _source(tree: xr.DataTree) -> str:
     """Return where the faces come from: size and spacing of the heights, and the version."""
-    heights = group(tree, "surfaces")
+    heights = group_of(tree, "surfaces")
     version = str(tree.attrs.get("source", "fractalcontact"))
     if heights is None or "height" not in heights:
         return version

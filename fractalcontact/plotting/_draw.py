@@ -14,6 +14,7 @@ import xarray as xr
 from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.progress import track
+from fractalcontact.base.study import group_of, member_count
 from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems, writing
 from fractalcontact.plotting._closure import closure_laws
@@ -22,10 +23,10 @@ from fractalcontact.plotting._curves import curves
 from fractalcontact.plotting._dilatancy import correlation, delta_dimension, dilatancy
 from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
 from fractalcontact.plotting._directional_roughness import directional_roughness
-from fractalcontact.plotting._ensemble import draw_with_band, member_count, reduced_trees
+from fractalcontact.plotting._ensemble import draw_with_band, reduced_trees
 from fractalcontact.plotting._fields import contact_domains, first_contact, surface
 from fractalcontact.plotting._flow import hydraulic_aperture, uplift
-from fractalcontact.plotting._inputs import group, words
+from fractalcontact.plotting._inputs import words
 from fractalcontact.plotting._islands import alluvial, islands, lineage
 from fractalcontact.plotting._paths import at_shear, evenly_sampled_reach, loaded_steps, shear_text
 from fractalcontact.plotting._scans import scans
@@ -252,7 +253,7 @@ def _draw_all(tree: xr.DataTree, folder: Path, progress: bool, formats: Sequence
 
 
 def _draw_row(row: Row, tree: xr.DataTree) -> Any:
-    return row.draw(_data_of(tree, row), **{name: group(tree, path) for name, path in row.beside.items()})
+    return row.draw(_data_of(tree, row), **{name: group_of(tree, path) for name, path in row.beside.items()})
 
 
 def _data_of(tree: xr.DataTree, row: Row) -> Any:
@@ -261,7 +262,7 @@ def _data_of(tree: xr.DataTree, row: Row) -> Any:
         node: Any = tree.children.get(row.group.removesuffix("/*"), xr.DataTree())
         has_curve = any(curve_of(child.to_dataset(inherit=False))[1] for child in node.children.values())
         return node if has_curve else None
-    data = group(tree, row.group)
+    data = group_of(tree, row.group)
     return data if data is not None and row.variable in data.variables else None
 
 

@@ -10,17 +10,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.study import MEMBER
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._style import Axes
 
-MEMBER = "member"
 SAME = 1e-12  # relative; equal curves may be shown in different units
 MEDIAN, BAND = 0.5, (0.16, 0.84)  # the band of one standard deviation to either side, if normal
-
-
-def member_count(tree: xr.DataTree) -> int:
-    """Return the number of members of an ensemble; 0 for a single study."""
-    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
 
 
 def reduced_trees(tree: xr.DataTree) -> list[xr.DataTree]:

@@ -162,13 +162,3 @@ def nearest(values: Any, target: float) -> int:
     """Return the index of the value nearest to `target`, ignoring NaN."""
     distance = np.abs(np.asarray(values, dtype=float) - target)
     return int(np.argmin(np.where(np.isnan(distance), np.inf, distance)))
-
-
-def group(tree: xr.DataTree, path: str) -> xr.Dataset | None:
-    """Return the Dataset of a group, or None where the study has none."""
-    try:
-        node: Any = tree[path]
-    except KeyError:
-        return None
-    dataset: xr.Dataset | None = node.to_dataset() if getattr(node, "has_data", False) else None
-    return dataset

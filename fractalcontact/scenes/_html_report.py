@@ -24,12 +24,13 @@ from fractalcontact.base.netcdf import written_whole
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.references import provenance_of, scene_of
 from fractalcontact.base.schema import CORE_DIMS
+from fractalcontact.base.study import group_of, member_count, of_member
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes import _rows
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, page_of
-from fractalcontact.scenes._result_tables import SCAN, group_of, member_count, of_member, table_of
+from fractalcontact.scenes._result_tables import SCAN, spread, table_of
 from fractalcontact.scenes._results_folder import REPORT, is_report
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 from fractalcontact.scenes._tables import tables
@@ -256,7 +257,7 @@ def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str) -> Ma
     state = dataset[name]
     dims = [str(dim) for dim in state.dims[:-2]]
     limit = MAPS if len(dims) < 2 else math.isqrt(MAPS)
-    shown = {dim: _spread(state.sizes[dim], limit) for dim in dims}
+    shown = {dim: spread(state.sizes[dim], limit) for dim in dims}
     dataset = dataset.isel(shown)
     state = dataset[name]
     key = _key(state)
@@ -327,11 +328,6 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
         "sizes": [(float(across(value * scale.factor)), f"{value:g}") for value in written],
         "unit": scale.unit,
     }
-
-
-def _spread(size: int, limit: int) -> Array:
-    """Return at most `limit` places, evenly spread from the first to the last."""
-    return np.unique(np.linspace(0, size - 1, min(size, limit)).round().astype(int))
 
 
 def _key(state: xr.DataArray) -> dict[str, str]:

@@ -10,6 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.random_effects import random_effects
 from fractalcontact.base.robust import is_far
+from fractalcontact.base.study import group_of
 from fractalcontact.scenes._result_tables import (
     SCAN,
     Column,
@@ -17,7 +18,6 @@ from fractalcontact.scenes._result_tables import (
     Rows,
     amount,
     column_scale,
-    group_of,
     plain,
     table_of,
 )

@@ -20,7 +20,7 @@ from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale
 Array = np.ndarray[Any, np.dtype[Any]]
 Remarks = Callable[[xr.DataTree, xr.Dataset], Iterable[str]]
 
-MEMBER, SCAN = "member", "scan"
+SCAN = "scan"  # the dim of many scans
 WIDE_COLUMN = 1e3  # greatest ratio of the values of a column with one unit
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 FRACTIONS = ("contact_fraction", "corrected_contact_fraction", "stick_fraction", "coverage", "largest_share")
@@ -129,7 +129,7 @@ class ResultTable:
         """Return at most so many rows, evenly spread from the first to the last."""
         if len(self.keys) <= most:
             return self
-        places = np.unique(np.linspace(0, len(self.keys) - 1, most).round().astype(int))
+        places = spread(len(self.keys), most)
         rest = f"{len(places)} of {len(self.keys)}"
         heads = (f"{self.key_heads[0]} ({rest})", *self.key_heads[1:])
         keys, cells = (tuple(rows[i] for i in places) for rows in (self.keys, self.cells))
@@ -283,6 +283,11 @@ def _decimals_of(spread: float) -> int:
     return max(0, 1 - int(np.floor(np.log10(spread))))
 
 
+def spread(count: int, most: int) -> Array:
+    """Return at most so many places, evenly spread from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+
+
 def finite(data: Any) -> Array:
     """Return the finite values."""
     values = np.asarray(data.values, dtype=float)
@@ -292,29 +297,6 @@ def finite(data: Any) -> Array:
 def length(value: Any) -> str:
     """Return a length in metres with the prefix that suits it."""
     return quantity_text(value, "m")
-
-
-def group_of(tree: xr.DataTree, path: str) -> xr.Dataset | None:
-    """Return the Dataset of a group, None where the study has none."""
-    node = tree
-    for name in path.split("/"):
-        if name not in node.children:
-            return None
-        node = node.children[name]
-    return node.to_dataset() if node.has_data else None
-
-
-def member_count(tree: xr.DataTree) -> int:
-    """Return the number of members of an ensemble; 0 for a single study."""
-    return max((node.sizes[MEMBER] for node in tree.subtree if MEMBER in node.sizes), default=0)
-
-
-def of_member(tree: xr.DataTree, number_of_member: int) -> xr.DataTree:
-    """Return the results of one member of an ensemble."""
-    place = {MEMBER: number_of_member}
-    one: xr.DataTree = tree.map_over_datasets(lambda data: data.isel(place, missing_dims="ignore"))
-    one.attrs = dict(tree.attrs)
-    return one
 
 
 def in_turn(data: xr.Dataset, dim: str) -> Iterator[tuple[str, xr.Dataset]]:

@@ -11,16 +11,15 @@ import xarray as xr
 
 from fractalcontact.base.file_contents import remarks
 from fractalcontact.base.references import provenance_of
+from fractalcontact.base.study import MEMBER, group_of
 from fractalcontact.base.units import jrc_text, number, quantity_text
 from fractalcontact.scenes._result_tables import (
-    MEMBER,
     ROUNDING,
     Column,
     Remarks,
     Rows,
     amount,
     finite,
-    group_of,
     in_turn,
     length,
     no_remarks,

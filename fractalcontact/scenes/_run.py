@@ -20,6 +20,7 @@ from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
 from fractalcontact.base.references import joined_references, provenance_of
+from fractalcontact.base.study import MEMBER, of_member
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
@@ -29,7 +30,6 @@ from fractalcontact.scenes._executor import Workers, worker_processes, workers_o
 from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
-from fractalcontact.scenes._result_tables import MEMBER, of_member
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene

@@ -14,13 +14,13 @@ import xarray as xr
 from fractalcontact.base import signals
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.progress import track
+from fractalcontact.base.study import MEMBER
 from fractalcontact.scenes import _parts
 from fractalcontact.scenes._checkpoint import PartStore, digest
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._inputs import plane_share, surface_grid
 from fractalcontact.scenes._parts import PartWithReaders, Precomputed, StageWork
 from fractalcontact.scenes._plan import stages_of, stored_maps
-from fractalcontact.scenes._result_tables import MEMBER
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stacked_results import stacked
 from fractalcontact.scenes._stages import FIGURES, STAGES, Stage

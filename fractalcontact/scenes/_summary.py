@@ -9,11 +9,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.file_contents import stage_rows
+from fractalcontact.base.study import group_of, member_count
 from fractalcontact.base.tables import Note, table
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._overview import scan_facts, scan_tables
-from fractalcontact.scenes._result_tables import ResultTable, group_of, length, member_count, table_of
+from fractalcontact.scenes._result_tables import ResultTable, length, table_of
 from fractalcontact.scenes._rows import aperture_as_placed
 from fractalcontact.scenes._stages import STAGES
 
