@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from scipy.special import zeta
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import aliased_power_law, half_weights, radial_wavenumber
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane
 BOUND_STEP = 1e-4  # of the derivative by H

@@ -20,14 +20,12 @@ from fractalcontact.base import rng as streams
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.netcdf import open as read
 from fractalcontact.base.netcdf import save
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import NONE, Problems, word_tuple
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.accuracy.estimators"
 TITLE = "Estimators of the Hurst exponent on surfaces of known exponent"

@@ -13,13 +13,12 @@ import xarray as xr
 
 from fractalcontact.accuracy._benchmarks import SUBPACKAGES, Benchmark, Method, benchmarks
 from fractalcontact.base.errors import SmallStrainWarning
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
 from fractalcontact.base.signals import Stop
 from fractalcontact.base.validation import Problems, word_tuple
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.accuracy.measure"
 REPEATS = 3  # further calls of a setting; the shortest counts, so that other work on the machine matters less

@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.contact._scaled_problem import sum_by_rows
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MAX_NEWTON_STEPS = 200  # far more than the pieces that a bracketed Newton step passes; it ends at rounding
 MAX_FORCE_CORRECTIONS = 50  # each clips more nodes to p_max; without success the lowest nodes bear the force

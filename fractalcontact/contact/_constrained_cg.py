@@ -80,6 +80,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped_simplex import (
@@ -90,8 +91,6 @@ from fractalcontact.contact._capped_simplex import (
 from fractalcontact.contact._contact_system import ContactSystem
 from fractalcontact.contact._preconditioner import FreeSet
 from fractalcontact.contact._scaled_problem import Control, Solution, sum_by_rows
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 ADMIT_RATIO = 0.4  # error outside over error inside from which nodes are admitted
 FEW = 0.003  # share of the free set that is always admitted

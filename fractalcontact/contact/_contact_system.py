@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.contact._operator import Operator, PeriodicOperator
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, Preconditioner
 from fractalcontact.contact._scaled_problem import Problem
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)

@@ -37,6 +37,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import SLIP, STICK
 from fractalcontact.contact._load_path import Step
 from fractalcontact.contact._tangential_operator import (
@@ -44,8 +45,6 @@ from fractalcontact.contact._tangential_operator import (
     TangentialOperator,
     TangentialPreconditioner,
 )
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # a step on rough contacts took 22 conjugate gradients at most in all, and at most 7 for one linear system
 # (192 steps, nu 0, .2 and .5, periodic and free, up to .99 of sliding): these end what does not converge

@@ -16,15 +16,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from scipy.linalg import solve as solve_dense
 
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.numbers import Array
 from fractalcontact.contact._scaled_problem import Control, Problem, Solution
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MAX_NODES = 8192  # of the dense system: half a gigabyte
 # of one step: each round removes a node at least, and a dozen are usual; a step that takes more is reported

@@ -14,19 +14,11 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.numbers import as_array, float_array
+from fractalcontact.base.numbers import Array, as_array, float_array
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._options import BOUNDARIES, ContactOptions
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner
-from fractalcontact.contact._scaled_problem import (
-    Body,
-    length_unit,
-    mean_by_rows,
-    scaled_body,
-    sum_by_rows,
-)
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.contact._scaled_problem import Body, length_unit, mean_by_rows, scaled_body, sum_by_rows
 
 MAX_ITERATIONS = 500  # 11 to 17 are usual, 26 for 3 x 400 nodes
 TARGET = 1e-14  # spread of the displacement over its mean at which the solve stops: what rounding leaves

@@ -8,11 +8,10 @@ Epstein (1903), summed after Ewald (1921).
 from __future__ import annotations
 
 from functools import cache, lru_cache
-from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
 
 DISC_RADII = ("second_order", "inscribed", "equal_area")
 # of the spacings, up to which the second-order radius exists, and plates of equal area leave the elastic

@@ -12,11 +12,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from fractalcontact.base.grid import Grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.contact._flat_block import flat_block
 from fractalcontact.contact._options import ContactOptions, LoadPath
 from fractalcontact.contact._scaled_problem import (
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from fractalcontact.contact._elimination import Elimination
     from fractalcontact.contact._window_solver import WindowSolver
 
-Array = np.ndarray[Any, np.dtype[Any]]
 
 ROWS = 64  # of a plane at a time: half a megabyte at n = 1024, in the place of one more plane
 # greatest share of an imposed force that the pressures may miss

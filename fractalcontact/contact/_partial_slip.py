@@ -13,21 +13,12 @@ import xarray as xr
 
 from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_problem
-from fractalcontact.contact.solver import (
-    METHODS,
-    Sheared,
-    ShearPath,
-    check_sliding,
-    solve_shear,
-    warn_lay,
-)
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.contact.solver import METHODS, Sheared, ShearPath, check_sliding, solve_shear, warn_lay
 
 GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
 

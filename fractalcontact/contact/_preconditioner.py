@@ -25,11 +25,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact._operator import PairSum, WavenumberMultiplier
 from fractalcontact.contact._scaled_problem import Body
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # Transforms of solutions at three loads on rough surfaces of 128 x 128 nodes (tolerance 1e-8), periodic and
 # free, over those with these values (26.7 and 19.5):

@@ -11,6 +11,7 @@ import xarray as xr
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.memory import Plane
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
@@ -18,8 +19,6 @@ from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
 from fractalcontact.contact.solver import PRESSURE_CLASSES, Pressed, rms_slope, solve, warn_steep
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 UNDETERMINED = (
     "normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement",

@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.contact import _influence
 from fractalcontact.contact._operator import SMALL, FreeOperator, Operator, PeriodicOperator
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)
@@ -140,11 +139,7 @@ def make_units(
 
 
 def scaled_body(
-    shape: tuple[int, int],
-    spacing: tuple[float, float],
-    periodic: bool,
-    influence: str,
-    disc_radius: str,
+    shape: tuple[int, int], spacing: tuple[float, float], periodic: bool, influence: str, disc_radius: str
 ) -> Body:
     """Return the scaled body of a grid, from valid options in SI units."""
     unit = length_unit(spacing)

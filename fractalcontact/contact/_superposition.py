@@ -33,11 +33,10 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import SLIP, STICK
 from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path, stiffness_of
 from fractalcontact.contact._tangential_operator import TangentialOperator
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 METHODS = ("superposition", "full")
 FORCE_ROUNDING = 1e-12  # of the normal force: forces that differ by less share one solution

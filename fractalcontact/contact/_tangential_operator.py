@@ -11,17 +11,14 @@ lambda = (2 - nu)/(2 (1 - nu)), e = nu/(2 (1 - nu)). In wave numbers that is 2/|
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact._operator import convolution_symbol, padded_length
 from fractalcontact.contact._preconditioner import DECAY, FADE, bin_edge, padded_plane
 from fractalcontact.contact._scaled_problem import Body
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 CLOSED_FORM_REACH = 8  # cells; beyond, the closed form of a cell loses digits; 16 gives the same displacement
 # from a distance in cells on: points of the quadrature; half as many change the displacement by 2e-14, more

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,12 +12,11 @@ from scipy import optimize, special
 
 from fractalcontact.base import spectra
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import detrended, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, float_array
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas", "hertz")
 # contact fraction beyond which asperities no longer deform independently: a choice, for greenwood_williamson
@@ -77,10 +75,7 @@ def _check(problems: Problems) -> None:
     check=_check,
 )
 def theories(
-    surface: xr.DataArray,
-    *,
-    contact_modulus: float,
-    nominal_pressure: float | Sequence[float] | Array,
+    surface: xr.DataArray, *, contact_modulus: float, nominal_pressure: float | Sequence[float] | Array
 ) -> xr.Dataset:
     """Return what theories of rough contact predict for a surface, to be drawn beside `press`.
 

@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.contact._constrained_cg import ConstrainedCG
 from fractalcontact.contact._contact_system import ContactSystem
 from fractalcontact.contact._operator import FreeOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
 from fractalcontact.contact._scaled_problem import Body, Control, Problem, Solution
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[slice, slice]
 
 WHOLE_PLANE = (slice(None), slice(None))

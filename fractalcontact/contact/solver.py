@@ -23,6 +23,7 @@ import numpy as np
 
 from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning
 from fractalcontact.base.grid import Grid, contact_edges
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
 from fractalcontact.base.schema import CONTACT, OPEN, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems
@@ -58,7 +59,6 @@ __all__ = [
     "warn_lay",
     "warn_steep",
 ]
-Array = np.ndarray[Any, np.dtype[Any]]
 
 PRESSURE_CLASSES = 50  # of a distribution, from 0 to the greatest pressure: enough for a curve of a plot
 # left an error of the stiffness below 1e-5 on rough surfaces of 256 x 256 nodes, .1 one of 5e-4

@@ -289,11 +289,7 @@ def _shapes(components: Components, grid: Grid, *, with_hull: bool) -> dict[str,
     angle = np.where(is_equal, np.where(yx > 0, 45.0, -45.0), np.rad2deg(0.5 * np.arctan2(2.0 * yx, yy - xx)))
     with np.errstate(divide="ignore", invalid="ignore"):
         eccentricity = np.where(long > 0, np.sqrt(1.0 - short / long), 0.0)
-    shapes = {
-        "orientation": angle,
-        "eccentricity": eccentricity,
-        "gyration_radius": np.sqrt(yy + xx),
-    }
+    shapes = {"orientation": angle, "eccentricity": eccentricity, "gyration_radius": np.sqrt(yy + xx)}
     if with_hull:
         shapes["solidity"] = _solidity(island, places, grid, count)
     wraps = components.wraps_by_island.any(1)

@@ -31,11 +31,7 @@ def _check(problems: Problems) -> None:
 
 @public_result(title="Minkowski dimension", references=SOURCE, check=_check)
 def minkowski_dimension(
-    mask: xr.DataArray,
-    *,
-    radii: Any = None,
-    periodic: bool | None = None,
-    valid: xr.DataArray | None = None,
+    mask: xr.DataArray, *, radii: Any = None, periodic: bool | None = None, valid: xr.DataArray | None = None
 ) -> xr.Dataset:
     """Minkowski dimension of a set of cells, from the area within a radius of it.
 
@@ -127,11 +123,7 @@ def dilated_area(cells: Array, valid: Array | None, grid: Grid, radii: Array) ->
 
 
 def _count_offsets(
-    cells: Array,
-    valid: Array | None,
-    reach: Sequence[int],
-    steps: Sequence[float],
-    periodic: Sequence[bool],
+    cells: Array, valid: Array | None, reach: Sequence[int], steps: Sequence[float], periodic: Sequence[bool]
 ) -> Array:
     """Count the observed cells by how many rows and columns the nearest cell of the set is away.
 

@@ -28,11 +28,7 @@ def _check(problems: Problems) -> None:
 
 @public_result(title="Generalised dimensions", references=SOURCE, check=_check)
 def generalised_dimensions(
-    mask: xr.DataArray,
-    q: Any = ORDERS,
-    *,
-    box_sizes: Any = None,
-    valid: xr.DataArray | None = None,
+    mask: xr.DataArray, q: Any = ORDERS, *, box_sizes: Any = None, valid: xr.DataArray | None = None
 ) -> xr.Dataset:
     """Generalised (Renyi) dimensions D_q of a set, or of a measure such as the contact pressure.
 

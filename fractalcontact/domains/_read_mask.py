@@ -12,12 +12,10 @@ import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.grid import DECADES, plane_coords
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, reading
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:

@@ -462,5 +462,5 @@ def _notes(low: float, high: float) -> dict[str, dict[str, str]]:
         "domain_dimension": {
             "long_name": f"box dimension of the domain {window}",
             "reason": "NaN where signature_flag is not 0: see the variable reason",
-        },
+        }
     }

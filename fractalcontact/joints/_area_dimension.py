@@ -12,7 +12,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.compass import read_direction
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -24,8 +24,6 @@ from fractalcontact.joints._sheared_contact import (
     press_sheared,
     pressed_dataset,
 )
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.area_dimension"
 FEWEST_CELLS = 8  # along an edge of the block, at the coarsest of the default spacings

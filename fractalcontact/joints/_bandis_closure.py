@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._criteria import CLOSURE_FITS, POSITIVE, check_quantities
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:

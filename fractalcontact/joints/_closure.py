@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import is_single, read_directions
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
 from fractalcontact.base.validation import Problems
@@ -24,7 +23,6 @@ from fractalcontact.joints._sheared_contact import (
     pressed_dataset,
 )
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Path = float | Sequence[float] | Array
 
 WHERE = "fractalcontact.joints.closure"

@@ -11,10 +11,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 REFERENCES = (
     "Persson, B. N. J., Relation between interfacial separation and load, Phys. Rev. Lett. 99 (2007); "

@@ -9,20 +9,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import (
-    check_direction,
-    check_directions,
-    read_direction,
-    read_directions,
-)
+from fractalcontact.base.compass import check_direction, check_directions, read_direction, read_directions
 from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
-from fractalcontact.base.numbers import as_array, float_array
+from fractalcontact.base.numbers import Array, as_array, float_array
 from fractalcontact.base.provenance import plain
 from fractalcontact.base.tables import html_table
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import NONE, Problems
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Pair = tuple[float, float]
 
 WHERE = "fractalcontact.joints.Crack"

@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 MPA, MM, MICRON = 1e6, 1e-3, 1e-6  # units of the published fits
 SAMPLE_LENGTH = 0.1  # m: the joint to which JRC and JCS of a laboratory sample refer

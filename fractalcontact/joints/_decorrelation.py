@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,15 +20,13 @@ from fractalcontact.base.compass import (
     direction_coords,
     read_directions,
 )
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, missing_heights
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.decorrelation_length"
 THRESHOLD = math.exp(-1.0)  # correlation, over that at no shear, that defines the decorrelation length

@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
@@ -20,7 +20,6 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import delta_surface
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Window = tuple[float, float]
 
 WHERE = "fractalcontact.joints.delta_dimension"

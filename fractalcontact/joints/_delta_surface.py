@@ -17,13 +17,11 @@ import xarray as xr
 from fractalcontact.base import fft
 from fractalcontact.base.compass import Direction, direction_coords, is_single, read_directions
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords, check_sliding
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.delta_surface"
 DEGREE = 5  # of the spline; 3 and 7 change the heights of a fractal face by 2 and 1 % of their greatest
@@ -39,9 +37,7 @@ def _check(problems: Problems) -> None:
 
 @public_result(title="delta-surface of a sheared crack", references=PAPER, check=_check)
 def delta_surface(
-    crack: Crack,
-    shear: float | Sequence[float] | Array,
-    direction: str | float | Sequence[str | float] = "E",
+    crack: Crack, shear: float | Sequence[float] | Array, direction: str | float | Sequence[str | float] = "E"
 ) -> xr.DataArray:
     """Return the difference of the facing heights after the block has slid.
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import COMPASS, Direction, direction_coords, read_directions
-from fractalcontact.base.numbers import float_array, number_of_entries
+from fractalcontact.base.numbers import Array, float_array, number_of_entries
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
@@ -29,8 +28,6 @@ from fractalcontact.joints._sheared_contact import (
     press_sheared,
     pressed_dataset,
 )
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.dilatancy"
 

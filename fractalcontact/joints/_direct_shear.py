@@ -14,7 +14,7 @@ import xarray as xr
 
 from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
@@ -24,8 +24,6 @@ from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
 from fractalcontact.joints._sheared_contact import Pressing, check_pressing
 from fractalcontact.joints._worn_joint import SMALLEST_FORCE, WHERE, WornJoint, balanced_step, shear_stiffness
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 FIRST = "NaN before the first step"
 MAPS = ("residual_lower", "residual_upper")

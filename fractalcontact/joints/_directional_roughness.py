@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.grid import read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import detrended, slopes
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 EVERY_5_DEGREES = tuple(5.0 * i for i in range(72))
 THRESHOLDS = 200  # thresholds of dip at which the law is fitted; 100 or 400 change C by less than 0.1 %

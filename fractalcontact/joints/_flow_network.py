@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.coords import check_leading
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # Of the mean opening: less counts as contact. It carries 1e-9 of the flow of the mean, and is lost in the
 # rounding of greater links beside it. In 600 drawn gaps with openings over 1 to 11 decades the pressures were

@@ -9,12 +9,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import drop_unknown_coords
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 REFERENCES = (
     "Patton, F. D., Multiple modes of shear failure in rock, 1st ISRM Congress, Lisbon (1966); "

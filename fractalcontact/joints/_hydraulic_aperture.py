@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._criteria import (
@@ -17,9 +18,6 @@ from fractalcontact.joints._criteria import (
     LARGEST_JRC,
     POSITIVE,
 )
-
-Array = np.ndarray[Any, np.dtype[Any]]
-
 
 BOUNDS: dict[str, dict[str, Any]] = {
     "aperture": POSITIVE,

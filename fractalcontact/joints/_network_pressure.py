@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra
+from fractalcontact.base.numbers import Array
 from fractalcontact.joints._flow_network import Held, Network, dissipation, even_gradient
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 LARGEST_DIRECT = 300_000  # unknowns up to which elimination is faster than multigrid
 # Relative error of the flow, in the norm of the preconditioner, that ends the iteration. With 1e-9 pressures

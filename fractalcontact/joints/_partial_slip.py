@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import read_direction
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
@@ -23,7 +23,6 @@ from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedConta
 if TYPE_CHECKING:
     from fractalcontact.contact.solver import LoadPath, ShearPath
 
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.partial_slip"
 LOAD_CHANGE = 0.01  # of the normal force, over which the normal stiffness is a difference quotient

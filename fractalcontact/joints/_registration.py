@@ -18,10 +18,10 @@ import xarray as xr
 
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Pair = tuple[float, float]
 
 WHERE = "fractalcontact.joints.register"

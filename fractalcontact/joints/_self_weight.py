@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import COMPASS
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -18,8 +18,6 @@ from fractalcontact.joints._crack import Crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._dilatancy import dilatancy
 from fractalcontact.joints._friction import LOCKED, LOCKED_ANGLE
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 FROM_DILATANCY = ("dilatancy", "residual", "converged", "rms_slope", "basic_friction_angle", "nominal_area")
 FROM_RIGID = ("rigid_dilatancy", "basic_friction_angle", "nominal_area")

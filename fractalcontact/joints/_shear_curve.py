@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_direction, read_direction
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
@@ -24,8 +24,6 @@ from fractalcontact.joints._criteria import (
 )
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 from fractalcontact.joints._strength_envelope import OUTSIDE
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
 SMALLEST_PEAK = 1e-4

@@ -23,7 +23,7 @@ import xarray as xr
 from fractalcontact.base.compass import Direction, direction_coords
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.numbers import number_of_entries
+from fractalcontact.base.numbers import Array, number_of_entries
 from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import content, plain
 from fractalcontact.base.references import PAPER, joined_references, provenance_of
@@ -34,7 +34,6 @@ from fractalcontact.joints._delta_surface import delta_heights
 if TYPE_CHECKING:
     from fractalcontact.contact.solver import ContactOptions, LoadPath, Sheared, ShearPath
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Columns = dict[str, Array]
 
 # how the faces of the flat block are loaded, and what that makes of the bulk part of the closure
@@ -231,12 +230,7 @@ def press_sheared(
 
 
 def press_against_spring(
-    pressing: Pressing,
-    shears: Array,
-    lifted: Array,
-    towards: Direction,
-    stiffness: float,
-    progress: bool,
+    pressing: Pressing, shears: Array, lifted: Array, towards: Direction, stiffness: float, progress: bool
 ) -> Columns:
     """Press the crack together at every shear against a spring.
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._criteria import POSITIVE
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:
@@ -34,10 +30,7 @@ def _check(problems: Problems) -> None:
     check=_check,
 )
 def size_effect(
-    size_ratio: float | Sequence[float] | Array,
-    *,
-    contact_dimension: float,
-    roughness_dimension: float = 2.0,
+    size_ratio: float | Sequence[float] | Array, *, contact_dimension: float, roughness_dimension: float = 2.0
 ) -> xr.Dataset:
     """Return the factors by which the strength of a joint changes with its size.
 

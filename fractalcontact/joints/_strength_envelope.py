@@ -25,8 +25,6 @@ from fractalcontact.joints._criteria import (
 from fractalcontact.joints._directional_roughness import directional_roughness
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 
-Array = np.ndarray[Any, np.dtype[Any]]
-
 WHERE = "fractalcontact.joints.strength_envelope"
 STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray 1981)
 OPTIONAL = (

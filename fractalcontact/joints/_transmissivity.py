@@ -6,7 +6,6 @@ import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,13 +13,12 @@ import xarray as xr
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.grid import periodic_axes, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints import _flow_network
 from fractalcontact.joints._flow_network import Network
 from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 REFERENCES = (
     "Zimmerman, R. W. and Bodvarsson, G. S., Hydraulic conductivity of rock fractures, Transport in Porous "

@@ -12,13 +12,12 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _flow_network
 from fractalcontact.joints._flow_network import Held, Network
 from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.uplift"
 EDGES = {"W": ("x", 0.0), "E": ("x", 1.0), "S": ("y", 0.0), "N": ("y", 1.0)}  # axis, share of its extent

@@ -11,9 +11,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import Direction
+from fractalcontact.base.numbers import Array
 from fractalcontact.joints._sheared_contact import Pressing, ShearedContact
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.joints.direct_shear"
 # relative error of the load on the contacts, and of the normal force; 1e-4 takes half more time and changes

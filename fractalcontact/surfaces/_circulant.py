@@ -12,14 +12,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.errors import FractalContactError
+from fractalcontact.base.numbers import Array
 
-Array = np.ndarray[Any, np.dtype[Any]]
 ROUNDING = 1e-14  # largest negative eigenvalue, over the largest, that rounding may leave
 CACHED = 1 << 24  # largest number of torus points whose amplitudes are cached: 34 MB
 BLOCK = 1 << 16  # numbers processed at a time, so that they stay in the processor cache

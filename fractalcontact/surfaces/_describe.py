@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,12 +11,12 @@ import xarray as xr
 from fractalcontact.base import spectra
 from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import scaled_slopes, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
-Array = np.ndarray[Any, np.dtype[Any]]
 
 HEIGHT_STATISTICS = (
     "mean_height",

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 PASSES = 20
 # a quantile of the absolute residual, and the standard deviation of a Gaussian over it; the median called a

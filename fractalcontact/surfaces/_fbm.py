@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.memory import require_memory
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
@@ -19,7 +20,6 @@ STEIN = (
     "Stein, Fast and exact simulation of fractional Brownian surfaces, "
     "Journal of Computational and Graphical Statistics 11 (2002) 587-599"
 )
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:

@@ -18,8 +18,8 @@ import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
 from fractalcontact.base.memory import require_unpacked, unpacked_limit
+from fractalcontact.base.numbers import Array
 
-Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
 RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20
 _BLOCK = 1 << 22  # bytes

@@ -11,12 +11,12 @@ import xarray as xr
 
 from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, height_planes
 
-Array = np.ndarray[Any, np.dtype[Any]]
 BRIGGS = "Briggs, Machine contouring using minimum curvature, Geophysics 39 (1974) 39-48"
 
 

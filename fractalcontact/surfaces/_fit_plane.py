@@ -10,12 +10,10 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.lengths import UNITS, in_metres
-from fractalcontact.base.numbers import as_array
+from fractalcontact.base.numbers import Array, as_array
 from fractalcontact.base.references import provenance_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 COLLINEAR = 1e-7  # of the length of a cloud: points that are less wide lie on a line
 THICKEST = 0.7  # of the width of a cloud: thicker ones have no plane of their own

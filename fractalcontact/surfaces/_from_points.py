@@ -13,13 +13,12 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import DECADES
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.lengths import UNITS
-from fractalcontact.base.numbers import as_array
+from fractalcontact.base.numbers import Array, as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _fit_plane
 from fractalcontact.surfaces._new_surface import check_length
 
-Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.from_points"
 
 RESOLVED = 8.0  # point distances in the shortest wave that gridding leaves unchanged

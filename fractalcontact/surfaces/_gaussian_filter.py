@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, height_planes
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 LEAST_SPACINGS = 4  # of the cutoff: a shorter kernel has too few points for its transmission
 _SPREAD = math.sqrt(math.log(2.0) / 2.0) / math.pi  # standard deviation over the cutoff

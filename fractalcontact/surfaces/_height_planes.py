@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import core_dims
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def check_planes(problems: Problems) -> bool:

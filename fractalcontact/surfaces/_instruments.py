@@ -15,13 +15,12 @@ import numpy as np
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.netcdf_lock import NETCDF_LOCK
-from fractalcontact.base.numbers import is_real
+from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import FileContent, Request
 from fractalcontact.surfaces._new_surface import surface_array
 
-Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read"
 PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"
 ARRAYS = ("h5", "mat", "npz")  # arrays of (row, column), in metres as those of an npy file

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
@@ -21,7 +22,6 @@ FOURNIER = (
 # Hurst exponents, and the relative error of the mean square increments over 64 points measured at them
 MEASURED_ERROR = (0.1, 0.3, 0.5, 0.7, 0.9), (1.2, 0.1, 0.27, 0.38, 0.39)
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Points = Sequence[tuple[float, float]]
 
 
@@ -33,10 +33,7 @@ def _check(problems: Problems) -> None:
 
 
 @public_result(
-    title="Surface by random midpoint displacement",
-    references=FOURNIER,
-    check=_check,
-    memory=17.0,
+    title="Surface by random midpoint displacement", references=FOURNIER, check=_check, memory=17.0
 )
 def midpoint(
     shape: Sequence[int],

@@ -12,10 +12,8 @@ import xarray as xr
 from fractalcontact.base import rng as streams
 from fractalcontact.base.grid import DECADES, plane_coords
 from fractalcontact.base.memory import require_memory
-from fractalcontact.base.numbers import float_array, is_real, number_of_axes
+from fractalcontact.base.numbers import Array, float_array, is_real, number_of_axes
 from fractalcontact.base.validation import GIVEN, Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SHORTEST, LONGEST = 10.0**-DECADES, 10.0**DECADES  # m
 COPIES = 2  # of the heights: the result and one work array
@@ -77,10 +75,7 @@ def sizes_and_steps(shape: Any, spacing: Any) -> tuple[tuple[int, ...], tuple[fl
 
 
 def surface_array(
-    heights: Any,
-    spacing: Sequence[float],
-    periodic: Sequence[bool],
-    leading: Mapping[str, Any] | None = None,
+    heights: Any, spacing: Sequence[float], periodic: Sequence[bool], leading: Mapping[str, Any] | None = None
 ) -> xr.DataArray:
     """Return heights (m) as a DataArray `height` whose first cell starts at the origin.
 

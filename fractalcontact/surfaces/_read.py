@@ -17,7 +17,7 @@ from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
 from fractalcontact.base.lengths import UNITS, in_metres
-from fractalcontact.base.numbers import is_real
+from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.references import provenance_of
 from fractalcontact.base.results import public_result
@@ -32,7 +32,6 @@ from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_inst
 from fractalcontact.surfaces._new_surface import axis_spacing, check_spacing
 from fractalcontact.surfaces._read_points import Points
 
-Array = np.ndarray[Any, np.dtype[Any]]
 T = TypeVar("T")
 WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
@@ -75,9 +74,7 @@ def _check(problems: Problems) -> None:
         expected = "'bottom' for a NetCDF file, which has its y"
         problems.require(given.first_row in (None, "bottom"), "first_row", expected)
         problems.require(
-            given.channel is None or isinstance(given.channel, str),
-            "channel",
-            "the name of a variable",
+            given.channel is None or isinstance(given.channel, str), "channel", "the name of a variable"
         )
 
 

@@ -18,6 +18,7 @@ import xarray as xr
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.memory import require_unpacked, unpacked_limit
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, reading
@@ -25,7 +26,6 @@ from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import NotATable, Table
 from fractalcontact.surfaces._instruments import PROJECT
 
-Array = np.ndarray[Any, np.dtype[Any]]
 WHERE = "fractalcontact.surfaces.read_points"
 
 MESHES = (".ply", ".stl", ".obj", ".off")
@@ -98,10 +98,7 @@ def _check(problems: Problems) -> None:
     error=UnreadableFile,
 )
 def read_points(
-    path: str | os.PathLike[str],
-    *,
-    units: str | None = None,
-    columns: Sequence[str | int] | None = None,
+    path: str | os.PathLike[str], *, units: str | None = None, columns: Sequence[str | int] | None = None
 ) -> xr.Dataset:
     """Read the points of a cloud or mesh, to select a part of them or to fit a plane.
 

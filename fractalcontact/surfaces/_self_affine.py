@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import Moments
 from fractalcontact.base.validation import Problems
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # the integral of x^power J0(x): power series below, quadrature between, asymptotic series above
 _SERIES, _ASYMPTOTIC, _TERMS = 6.0, 40.0, 40

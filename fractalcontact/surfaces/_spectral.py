@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
@@ -22,7 +22,6 @@ JACOBS = (
     "Jacobs, Junge and Pastewka, Quantitative characterization of surface topography using spectral "
     "analysis, Surface Topography: Metrology and Properties 5 (2017) 013001"
 )
-Array = np.ndarray[Any, np.dtype[Any]]
 BLOCK = 1 << 15  # modes processed at a time, so that they stay in the processor cache
 EDGE = 1e-9  # relative distance from a cut-off within which a mode counts as inside
 
@@ -77,10 +76,7 @@ def _check_order(problems: Problems) -> None:
 
 
 @public_result(
-    title="Self-affine surface from its power spectrum",
-    references=JACOBS,
-    check=_check,
-    memory=17.0,
+    title="Self-affine surface from its power spectrum", references=JACOBS, check=_check, memory=17.0
 )
 def spectral(
     shape: int | Sequence[int],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,12 +11,11 @@ import xarray as xr
 from fractalcontact.base import fft
 from fractalcontact.base.coords import check_leading, leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, height_planes
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 DECAY = 0.2  # of the autocorrelation at the lengths
 _CORE_WIDTH = 0.4  # of the material ratio under the secant of the core

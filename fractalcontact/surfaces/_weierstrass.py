@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
@@ -18,7 +19,6 @@ AUSLOOS = (
     "Ausloos and Berman, A multivariate Weierstrass-Mandelbrot function, Proceedings of the Royal Society of "
     "London A 400 (1985) 331-350"
 )
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:

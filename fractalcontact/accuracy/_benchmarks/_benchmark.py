@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array as Array
 
 POINTS, TOLERANCE = "points along an edge", "tolerance"
 
