@@ -13,12 +13,20 @@ import xarray as xr
 
 from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_problem
-from fractalcontact.contact.solver import METHODS, Sheared, ShearPath, check_sliding, solve_shear, warn_lay
+from fractalcontact.contact.solver import (
+    METHODS,
+    Sheared,
+    ShearPath,
+    check_one_load,
+    check_sliding,
+    solve_shear,
+    warn_lay,
+)
 
 GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
 
@@ -32,21 +40,10 @@ def _check(problems: Problems) -> None:
     problems.choice("method", among=METHODS, optional=True)
     problems.choices("keep", among=SLIP_MAPS)
     load = check_problem(problems, method="fast")
-    if load is None:
-        return
-    expected = "one number: the normal load is constant while the tangential force changes"
-    problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
-    if not problems.messages and load.control != "closure":  # under a closure the force is not known yet
-        normal = float(load.solver_values(read_grid(given.surface).nominal_area)[1][0])
-        path = _shear_path(
-            given.tangential_force, given.direction, given.friction_coefficient, given.poisson, given.method
-        )
-        check_sliding(problems, path, normal)
-
-
-def _shear_path(forces: Any, direction: Any, friction: Any, poisson: Any, method: str | None) -> ShearPath:
-    y, x = read_direction(direction).unit
-    return ShearPath(tuple(float_array(forces).tolist()), (x, y), float(friction), float(poisson), method)
+    if load is not None and check_one_load(problems, load):
+        friction, poisson = given.friction_coefficient, given.poisson
+        path = ShearPath.read(given.tangential_force, given.direction, friction, poisson, given.method)
+        check_sliding(problems, path, float(load.solver_values(read_grid(given.surface).nominal_area)[1][0]))
 
 
 @public_result(
@@ -155,7 +152,7 @@ def partial_slip(
         {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     )
     grid = read_grid(surface)
-    path = _shear_path(tangential_force, direction, friction_coefficient, poisson, method)
+    path = ShearPath.read(tangential_force, direction, friction_coefficient, poisson, method)
     heights = np.asarray(surface.values, dtype=np.float64)
     problem = (grid, float(contact_modulus), options, load)
     sheared = solve_shear(heights, *problem, path, keep=word_tuple(keep), progress=progress)

@@ -33,7 +33,8 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.compass import read_direction
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.schema import SLIP, STICK
 from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path, stiffness_of
 from fractalcontact.contact._tangential_operator import TangentialOperator
@@ -60,6 +61,12 @@ class ShearPath:
     friction: float
     poisson: float
     method: str | None = None
+
+    @classmethod
+    def read(cls, forces: Any, direction: Any, friction: Any, poisson: Any, method: str | None) -> ShearPath:
+        """Return it from valid arguments, with a direction as word or azimuth."""
+        y, x = read_direction(direction).unit
+        return cls(tuple(float_array(forces).tolist()), (x, y), float(friction), float(poisson), method)
 
     @property
     def compliance_ratio(self) -> float:

@@ -53,6 +53,7 @@ __all__ = [
     "block_stiffness",
     "check_scale",
     "check_sliding",
+    "check_one_load",
     "rms_slope",
     "solve",
     "solve_shear",
@@ -314,6 +315,13 @@ def _solve_fully(
         law = (shear.friction, np.array(shear.unit))
         coulomb_path(normal, operator, np.array(shear.forces), superposition.traction(), *law, columns, maps)
     return maps
+
+
+def check_one_load(problems: Problems, load: LoadPath) -> bool:
+    """Check that the load of a sheared contact is one number; return whether its force is known and valid."""
+    expected = "one number: the normal load is constant while the tangential force changes"
+    problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
+    return not problems.messages and load.control != "closure"
 
 
 def check_sliding(problems: Problems, shear: ShearPath, normal_force: float) -> bool:

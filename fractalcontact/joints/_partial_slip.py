@@ -41,11 +41,7 @@ def _check(problems: Problems) -> None:
     problems.choice("method", among=contact_solver.METHODS, optional=True)
     problems.choices("keep", among=SLIP_MAPS)
     load = check_pressing(problems, method="fast")
-    if load is None:
-        return
-    expected = "one number: the normal load is constant while the tangential force changes"
-    problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
-    if problems.messages or load.control == "closure":  # under a closure the force is not known yet
+    if load is None or not contact_solver.check_one_load(problems, load):
         return
     path = _shear_path(
         given.crack, given.tangential_force, given.direction, given.friction_coefficient, given.method
@@ -61,12 +57,10 @@ def _shear_path(
 ) -> ShearPath:
     from fractalcontact.contact.solver import ShearPath
 
-    y, x = read_direction(direction).unit
     friction = friction_coefficient
     if friction is None:
         friction = math.tan(math.radians(crack.basic_friction_angle))
-    forces = tuple(float_array(forces).tolist())
-    return ShearPath(forces, (x, y), float(friction), crack.contact_poisson, method)
+    return ShearPath.read(forces, direction, friction, crack.contact_poisson, method)
 
 
 @public_result(
