@@ -18,8 +18,6 @@ from fractalcontact.plotting._paths import PATH
 from fractalcontact.plotting._style import Axes, AxesArray, Panels, needs_log_axis
 from fractalcontact.plotting._units import PER_CENT, Quantity, Units, name_of, scale_of
 
-MOST_STEPS = 6  # of the distributions in one figure
-MARKED = 30  # most points of a curve that are marked beside theories
 OF_THEORY = {"contact_stiffness": "interface_stiffness", "stiffness": "interface_stiffness"}
 
 
@@ -153,7 +151,7 @@ def path(
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
     y = quantity(data, names[0], dims, title, np.array(values))
-    panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=MARKED)
+    panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=_style.MOST_DOTS)
     for name, rows, line in zip(names, values, cycle(_style.LINES), strict=False):
         title = name_of(data[name])
         panel.curves(title, x.values, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
@@ -201,7 +199,7 @@ def pressure_distribution(
     with Problems("fc.plotting.pressure_distribution") as problems:
         count = data.sizes["pressure_class"]
         problems.require(count > 0, "result.pressure_class", "at least one entry", NONE)
-    data = data.isel(step=_style.spread_indices(data.sizes["step"], MOST_STEPS))
+    data = data.isel(step=_style.spread_indices(data.sizes["step"], _style.MOST_CURVES))
     share = table(data, "area_share", ("step", "pressure_class"))
     greatest, nominal = (table(data, name, ("step",)) for name in names[1::2])
     classes = np.asarray(data["pressure_class"].values, dtype=np.float64)

@@ -36,7 +36,6 @@ CURVES = {
 }
 NARROW = 0.1  # the axis of dimensions is at least this long: nearly equal ones must not look different
 ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
-MOST_DOTS = 60  # of a curve whose points are marked
 CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
@@ -135,7 +134,7 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     dims = curve[scale].dims
     x, y = quantity(curve, scale, dims), quantity(curve, value, dims)
     slopes = table(curve, "local_slope", dims) if "local_slope" in curve else np.full(y.values.shape, np.nan)
-    style = {"color": _style.BLUE, "marker": "." if x.values.size <= MOST_DOTS else ""}
+    style = {"color": _style.BLUE, "marker": "." if x.values.size <= _style.MOST_DOTS else ""}
     above, below = LinePanel(upper, x, y), LinePanel(lower, x, Quantity(slopes, PLAIN, "local slope"))
     above.line("curve", x.values, y.values, lw=1.2, **style)
     below.line("local slope", x.values, slopes, lw=1.0, **style)

@@ -25,8 +25,6 @@ from fractalcontact.plotting._paths import PATH, at_shear, by_load, by_shear, lo
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import PLAIN, Quantity, Units, name_of, number_texts, scale_of
 
-MAX_CURVES = 8  # of the distributions of many masks
-MOST_DOTS = 39  # of a distribution whose islands are marked
 SEVERAL = ("member", "direction", "shear", "step")
 
 
@@ -78,7 +76,7 @@ def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
     """Draw the number of islands that are at least as large as each, a curve for each mask."""
     areas = np.asarray(data["area"].values, dtype=float).ravel()
     family, groups = _masks_of(data)
-    shown = _style.spread_indices(len(groups), MAX_CURVES)
+    shown = _style.spread_indices(len(groups), _style.MAX_LEGEND_ENTRIES)
     labels = [family.labels[i] for i in shown] if family.labels else ()
     family = ordered(labels, family.name, family.unit, len(shown))
     size = Quantity(areas, scale_of(data["area"]), name_of(data["area"]))
@@ -88,7 +86,7 @@ def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
     for i, number in enumerate(shown):
         group = areas[groups[number]]
         ordered_areas = np.sort(group[np.isfinite(group)])[::-1]
-        marker = "." if ordered_areas.size <= MOST_DOTS else ""
+        marker = "." if ordered_areas.size <= _style.MOST_DOTS else ""
         style = family.styles[i] | {"drawstyle": "steps-pre", "marker": marker}
         panel.line(family.curve("islands", i), ordered_areas, np.arange(1, ordered_areas.size + 1), **style)
     panel.finish(log="xy", empty="no islands")

@@ -15,7 +15,6 @@ from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Quantity, Units, label_axis, name_of, scale_of, shown_in
 
 Array = np.ndarray[Any, np.dtype[Any]]
-Extent = tuple[float, float, float, float]
 
 MOST_CELLS = 1600  # along an edge; a finer plane is averaged first, since no screen shows more
 SHADED_SLOPE = 0.5  # rms slope after the exaggeration of the shading

@@ -28,7 +28,6 @@ from fractalcontact.plotting._units import Quantity, Units
 SIZES = ("box_length", "radius_length", "side", "box_size", "radius")
 IN_CELLS = ("box_size", "radius")
 CELLS = Scale(1.0, "cells")  # where a mask has no lengths
-MOST = 6  # curves in a panel; more cross those of their random nulls illegibly
 TOLERANCE = 0.1  # of a local dimension beyond 0 or 2
 STEEP = 1.5  # ratio of values above which the lacunarity is drawn on a logarithmic axis
 SPOTS = "random spots, equal area, number and perimeter"
@@ -232,7 +231,7 @@ def _size_curves(
 ) -> Iterator[tuple[LinePanel, xr.Dataset, str]]:
     """Draw a variable over box size, beside its random null, and yield the panels to be finished."""
     name, title = names
-    for ax, dim, path, family, text in _chosen_paths(data, shear, force, shown, MOST):
+    for ax, dim, path, family, text in _chosen_paths(data, shear, force, shown, _style.MOST_CURVES):
         over = next(str(last) for last in path[name].dims[::-1] if last not in PATH)
         values = quantity(path, name, (dim, over), title)
         panel = LinePanel(ax, sizes_of(path, over), values, family)

@@ -49,6 +49,8 @@ HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
 SEQUENCE_ENDS = {"light": (0.0, 0.86), "dark": (0.3, 1.0)}
 MAX_LEGEND_ENTRIES = 8  # more do not fit beside a panel of usual height
 MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
+MOST_DOTS = 40  # the same of dots, which are half as wide
+MOST_CURVES = 6  # in a panel: more cross each other, and their nulls or theories, illegibly
 # lines of the first, second ... of several kinds of curves; long dashes stay apart where curves are steep
 LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")
 # what stands beside the curves of a figure is narrower than they are: nulls, references, theories

@@ -38,9 +38,9 @@ from fractalcontact.scenes._tables import tables
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.scenes.report"
-SURFACE_CELLS = 128  # along the longer side of the surface that can be turned
+SURFACE_CELLS = 128  # along the longer side of the surface that can be turned: 44 kB in the page
 MAP_CELLS = 400  # along the longer side of a map
-MAPS = 120  # pictures of one set of maps
+MAPS = 120  # pictures of one set of maps: at 2 bits for each cell no more than 7 MB in the page
 ROWS = 100  # of a table on the page; the CSV file has all
 RELIEF = 0.25  # height range of the drawn surface over its longer side
 NO_HEIGHT = 65535  # of the 16-bit levels: a point without height
@@ -129,7 +129,11 @@ def report(
         is_free = not target.is_file() or is_report(target)
         problems.require(is_free, "path", "a new file, or a report of this package", target.name)
     with writing(WHERE, "path", target), tempfile.TemporaryDirectory() as folder:
-        pictures = _drawn(tree, folder) if figures is None else figures
+        pictures: Sequence[str | os.PathLike[str]] | None = figures
+        if pictures is None:
+            from fractalcontact import plotting  # only here: `run` has drawn them
+
+            pictures = plotting.draw(tree, folder)
         return write_report(tree, target, pictures, summary_of(tree))
 
 
@@ -385,13 +389,6 @@ def _value(scalar: xr.DataArray) -> str:
     if scalar.dtype.kind not in "fiu":
         return str(scalar.values)
     return quantity_text(float(scalar), str(scalar.attrs.get("units", "")), 4)
-
-
-def _drawn(tree: xr.DataTree, folder: str) -> list[Path]:
-    """Draw every figure of a study and return the files."""
-    from fractalcontact import plotting
-
-    return plotting.draw(tree, folder)
 
 
 def _picture_file(path: Path) -> tuple[str, bytes]:

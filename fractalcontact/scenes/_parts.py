@@ -10,7 +10,7 @@ import json
 import time
 import warnings
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -222,7 +222,8 @@ def _split(stage: Stage, function: Part, options: Mapping[str, Any], nodes: int)
 def _pieces(dim: str, options: Mapping[str, Any], nodes: int) -> list[dict[str, Any]]:
     """Return the arguments along one dim: one value each, or one section of the path of the load."""
     if dim != "step":
-        return [{dim: [value]} for value in _as_list(options[dim])]
+        given = options[dim]
+        return [{dim: [value]} for value in (given if isinstance(given, (list, tuple)) else [given])]
     load = next(key for key in LOADS if key in options)
     path = options[load]
     if not isinstance(path, list):
@@ -240,10 +241,6 @@ def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict
     own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
     alike = own == other and "normal_force" in of_closure
     return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}
-
-
-def _as_list(value: Any) -> Sequence[Any]:
-    return value if isinstance(value, (list, tuple)) else [value]
 
 
 def _heights(results: Results, stage: str) -> xr.DataArray:

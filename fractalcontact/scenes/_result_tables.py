@@ -154,7 +154,7 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = 
     key_heads, key_cells = [], []
     for dim in keys:
         values = [_key(dim, state, data, rows) for state in states]
-        key_heads.append(_load_head(rows) if dim == "step" else KEYS[dim])
+        key_heads.append(rows.load.replace("_", " ") if dim == "step" else KEYS[dim])
         key_cells.append(values)
     if {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads:
         pressures = finite(data["nominal_pressure"])
@@ -164,10 +164,6 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = 
     remarks = () if screen else tuple(rows.remarks(tree, data))
     rows_of_cells = tuple(zip(*columns.values(), strict=True))
     return ResultTable(rows.title, tuple(key_heads), table_keys, tuple(columns), rows_of_cells, remarks)
-
-
-def _load_head(rows: Rows) -> str:
-    return rows.load.replace("_", " ")
 
 
 def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:

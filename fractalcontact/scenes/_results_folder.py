@@ -63,9 +63,10 @@ def _check(folder: Path, scene: Scene, problems: Problems) -> None:
         got = Words(f"{folder.name!r} with {', '.join(foreign)}")
         problems.add("out", f"a folder without files of others under these names ({REMEDY})", got)
         return
+    own = _identity({"title": scene.name, **scene.tables})
     for name in (RESULT, PARTIAL_RESULT):
         other = _scene_of(folder / name)
-        if other is not None and _identity(other) != _identity({**scene.tables, **_title(scene)}):
+        if other is not None and _identity(other) != own:
             got = Words(f"{folder.name!r} with those of {other.get('title', 'another one')!r}")
             problems.add("out", f"a folder without results of another study ({REMEDY})", got)
             return
@@ -116,10 +117,6 @@ def _scene_of(path: Path) -> dict[str, Any] | None:
         return None
     scene = scene_of(root)
     return {"title": root.attrs.get("title")} | scene if scene else None
-
-
-def _title(scene: Scene) -> dict[str, Any]:
-    return {"title": scene.tables.get("title", scene.name)}
 
 
 def _identity(tables: Mapping[str, Any]) -> list[Any]:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
-from fractalcontact.base.compass import AZIMUTHS
+from fractalcontact.base.compass import AZIMUTHS, LARGEST_AZIMUTH
 from fractalcontact.base.compass import WORDS as AZIMUTH_WORDS
 from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.units import PRESSURE
@@ -26,8 +25,7 @@ SAMPLES = (
 )  # fmt: skip
 TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
 EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
-LONGEST_RANGE = 1_000_000  # entries, and members of an ensemble: more do not fit into memory as results
-LARGEST_AZIMUTH = 1e9  # degree; beyond it a double has no digits left below 360
+LONGEST_RANGE = 1_000_000  # entries of a range, members of an ensemble: more are a slip of the pen
 # arguments in Pa, which may have their unit, and words for others
 PRESSURES = (
     "young", "hardness", "yield_pressure", "contact_modulus", "nominal_pressure", "seating_pressure",
@@ -53,44 +51,49 @@ class Kind:
     schema: Schema = field(default_factory=dict)
 
 
-def number(unit: bool = False, **bounds: Any) -> Kind:
+def _kind(check: Callable[..., object], schema: Schema, *arguments: Any, **options: Any) -> Kind:
+    """Return the kind that a method of `Problems`, or a function like one, checks with these arguments."""
+    return Kind(lambda problems, place, value: check(problems, place, value, *arguments, **options), schema)
+
+
+def _bounded(kind: str, bounds: Mapping[str, float]) -> Schema:
+    return {"type": kind} | {BOUNDS[name]: bound for name, bound in bounds.items()}
+
+
+def number(unit: bool = False, **bounds: float) -> Kind:
     """Return the kind of one number inside bounds, with `unit` a pressure that may have its unit."""
-    schema = {"type": "number"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
-    return Kind(partial(_check_number, bounds), {"anyOf": [schema, WITH_UNIT]} if unit else schema)
+    schema = _bounded("number", bounds)
+    return _kind(Problems.number, {"anyOf": [schema, WITH_UNIT]} if unit else schema, **bounds)
 
 
-def _check_number(bounds: Mapping[str, Any], problems: Problems, place: str, value: Any) -> None:
-    problems.number(place, value, **bounds)
-
-
-def _numbers(unit: bool = False, pair: bool = False, **bounds: Any) -> Kind:
+def _numbers(unit: bool = False, pair: bool = False, **bounds: float) -> Kind:
     """Return the kind of one number, a list or a range of them; with `pair` one for each body at most."""
     one = number(unit, **bounds).schema
     several = {"type": "array", "minItems": 1, "items": one} | ({"maxItems": 2} if pair else {})
-
-    def check(problems: Problems, place: str, value: Any) -> None:
-        problems.numbers(place, value, **bounds)
-        fits = not (pair and isinstance(value, list)) or len(value) in (1, 2)
-        problems.require(fits, place, "one value, or [lower, upper]", value)
-
-    return Kind(check, {"anyOf": [*one.get("anyOf", [one]), several, *RANGES]})
+    schema = {"anyOf": [*one.get("anyOf", [one]), several, *RANGES]}
+    return _kind(_check_pair if pair else Problems.numbers, schema, **bounds)
 
 
-def _integer(**bounds: Any) -> Kind:
-    schema = {"type": "integer"} | {BOUNDS[name]: bound for name, bound in bounds.items()}
-    return Kind(lambda problems, place, value: problems.integer(place, value, **bounds), schema)
+def _check_pair(problems: Problems, place: str, value: Any, **bounds: Any) -> None:
+    problems.numbers(place, value, **bounds)
+    fits = not isinstance(value, list) or len(value) in (1, 2)
+    problems.require(fits, place, "one value, or [lower, upper]", value)
+
+
+def _integer(**bounds: int) -> Kind:
+    return _kind(Problems.integer, _bounded("integer", bounds), **bounds)
 
 
 def _choice(words: Iterable[str]) -> Kind:
     allowed = list(words)
-    return Kind(lambda problems, place, value: problems.choice(place, value, allowed), {"enum": allowed})
+    return _kind(Problems.choice, {"enum": allowed}, allowed)
 
 
 def _choices(words: Iterable[str]) -> Kind:
     """Return the kind of one word or a list of words."""
     allowed = list(words)
     schema = {"anyOf": [{"enum": allowed}, {"type": "array", "items": {"enum": allowed}}]}
-    return Kind(lambda problems, place, value: problems.choices(place, value, allowed), schema)
+    return _kind(Problems.choices, schema, allowed)
 
 
 def _check_files(problems: Problems, place: str, value: Any) -> None:
@@ -128,7 +131,7 @@ _AZIMUTH = number(above=-LARGEST_AZIMUTH, below=LARGEST_AZIMUTH).schema
 _DIRECTION = {"anyOf": [{"enum": [*COMPASS, *AZIMUTH_WORDS]}, _AZIMUTH]}
 _FILE = {"type": "string", "minLength": 1}
 ANYTHING, VALUE = Kind(_unchecked), Kind(_check_value)
-FLAG = Kind(lambda problems, place, value: problems.boolean(place, value), {"type": "boolean"})
+FLAG = Kind(Problems.boolean, {"type": "boolean"})
 FILES = Kind(_check_files, {"anyOf": [_FILE, {"type": "array", "minItems": 1, "items": _FILE}]})
 TITLE = Kind(
     lambda problems, place, value: problems.require(isinstance(value, str), place, "words", value),

@@ -43,15 +43,10 @@ def _aligned(results: Sequence[xr.Dataset]) -> list[xr.Dataset]:
         if any(index.dtype.kind == "f" for index in indexes):
             aligned = [_by_number(result, dim) for result in aligned]
             dim = f"{dim}_number"
-        union = list(
-            dict.fromkeys(value for result in aligned if dim in result.dims for value in _index(result, dim))
-        )
+        having = [result for result in aligned if dim in result.dims]
+        union = list(dict.fromkeys(value for result in having for value in result.get_index(dim)))
         aligned = [_reindexed(result, dim, union) for result in aligned]
     return aligned
-
-
-def _index(result: xr.Dataset, dim: Hashable) -> Any:
-    return result.get_index(dim)
 
 
 def _by_number(result: xr.Dataset, dim: Hashable) -> xr.Dataset:

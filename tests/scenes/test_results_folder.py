@@ -128,7 +128,7 @@ def test_refused_commands_leave_no_folder(tmp_path, monkeypatch):
         (("upper.nc", "lower.nc", "--as-scanned"), "swap"),
         (("upper.nc", "lower.nc"), "swap"),
         (("lower.nc", "plane.nc"), "nothing that fixes the position"),
-        (("lower.nc", "upper.nc", "--turn-upper", "x"), "nothing that fixes the position"),
+        (("lower.nc", "upper.nc", "--turn-upper", "x"), "it fits without turn_upper"),
         (("lower.nc", "holes.nc"), "upper inside the block"),
     ],
 )
