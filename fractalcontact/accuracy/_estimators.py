@@ -63,14 +63,12 @@ MEASURED = (
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    for name, value in {"blur": given.blur, "noise": given.noise, "marks": given.marks}.items():
-        problems.number(name, value, at_least=0.0)
+    for name in ("blur", "noise", "marks"):
+        problems.number(name, at_least=0.0)
     problems.numbers("hurst", at_least=0.01, at_most=0.99)
     has_sizes = problems.numbers("sizes", at_least=16, integral=True)
     chosen = problems.choices("families", among=FAMILIES)
-    if given.methods is not None:
-        chosen = problems.choices("methods", among=dimensions.methods()) and chosen
-    if chosen:
+    if problems.choices("methods", among=dimensions.methods(), optional=True) and chosen:
         some = bool(word_tuple(given.families)) and (given.methods is None or bool(word_tuple(given.methods)))
         problems.require(some, "families / methods", "at least one of each", NONE)
     has_members = problems.numbers("members", at_least=2, integral=True, optional=True)

@@ -22,6 +22,16 @@ def root_mean_square(errors: Array, axis: int) -> Array:
     return np.asarray(np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan)))
 
 
+def largest_error(exact: Any, *, relative: bool = False) -> Callable[[Any, float], float]:
+    """Return the function for the largest error against a known result, which the parameter may give."""
+
+    def error(result: Any, parameter: float) -> float:
+        truth = exact(parameter) if callable(exact) else exact
+        return float(np.max(np.abs(result / truth - 1.0 if relative else result - truth)))
+
+    return error
+
+
 @dataclass(frozen=True)
 class Method:
     """One method, to be measured at several values of its parameter.

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import domains, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import Array, Benchmark, Method
+from fractalcontact.accuracy._benchmarks._benchmark import Array, Benchmark, Method, largest_error
 
 SIZES = (64, 128, 256, 512, 1024)
 HURST, COVERAGE, BOX = 0.5, 0.1, 4
@@ -27,6 +27,8 @@ CARPET = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 
 def benchmarks() -> tuple[Benchmark, ...]:
     """Return the benchmarks of the domain measures."""
+    moments = np.array([np.log2(np.sum(WEIGHTS**q)) / (1.0 - q) for q in ORDERS])
+    density = largest_error(lambda n: PER_CELL + EXCESS / n**2, relative=True)
     return (
         _carpet_benchmark(),
         _boundary_benchmark(),
@@ -35,19 +37,27 @@ def benchmarks() -> tuple[Benchmark, ...]:
             "multiplicative cascade",
             "largest error of D_q at q = 0, 2, 3",
             "log2 of the sum of the four weights to the power q, over 1 - q",
-            (Method("generalised dimensions", SIZES, _cascade, _moments, _moments_error),),
+            (Method("generalised dimensions", SIZES, _cascade, _moments, largest_error(moments)),),
         ),
         Benchmark(
             "carpet of Sierpinski at three resolutions",
             "error of the dimension",
             "log 8 / log 3",
-            (Method("area dimension", (27, 81, 243, 729), _resolutions, _area_dimension, _carpet_error),),
+            (
+                Method(
+                    "area dimension",
+                    (27, 81, 243, 729),
+                    _resolutions,
+                    _area_dimension,
+                    largest_error(CARPET_DIMENSION),
+                ),
+            ),
         ),
         Benchmark(
             "number of islands at the critical coverage",
             "relative error of the islands for each cell, one periodic mask",
             f"{PER_CELL} + {EXCESS}/n^2 (Ziff, Finch and Adamchik 1997); the random scatter is about 1/n",
-            (Method("islands", SIZES, _critical, _island_density, _islands_error),),
+            (Method("islands", SIZES, _critical, _island_density, density),),
             equal_parameters=True,
         ),
         Benchmark(
@@ -91,7 +101,7 @@ def _carpet_benchmark() -> Benchmark:
         "Minkowski dimension": ("minkowski_dimension", {}),
     }
     methods = tuple(
-        Method(name, SIZES, _carpet, partial(_number, function, options), _carpet_error)
+        Method(name, SIZES, _carpet, partial(_number, function, options), largest_error(CARPET_DIMENSION))
         for name, (function, options) in measures.items()
     )
     truth = "log 8 / log 3; the cut fits no grid of boxes"
@@ -104,10 +114,6 @@ def _carpet(n: float) -> xr.DataArray:
     while mask.shape[0] < n:
         mask = np.kron(mask, CARPET).astype(bool)
     return _mask(mask[: int(n), : int(n)])
-
-
-def _carpet_error(dimension: float, _: float) -> float:
-    return float(abs(dimension - CARPET_DIMENSION))
 
 
 def _boundary_benchmark() -> Benchmark:
@@ -199,10 +205,6 @@ def _island_density(mask: xr.DataArray) -> float:
     return float(domains.islands(mask, periodic=True, keep=())["n_islands"]) / mask.size
 
 
-def _islands_error(density: float, n: float) -> float:
-    return float(abs(density / (PER_CELL + EXCESS / n**2) - 1.0))
-
-
 def _crosses(mask: xr.DataArray) -> bool:
     return bool(domains.percolation(mask, periodic=False)["percolates"].sel(axis="x"))
 
@@ -220,8 +222,3 @@ def _cascade(n: float) -> xr.DataArray:
 
 def _moments(measure: xr.DataArray) -> Array:
     return domains.generalised_dimensions(measure, list(ORDERS))["generalised_dimension"].values
-
-
-def _moments_error(dimensions: Array, _: float) -> float:
-    exact = [np.log2(np.sum(WEIGHTS**q)) / (1.0 - q) for q in ORDERS]
-    return float(np.abs(dimensions - exact).max())

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import joints, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import TOLERANCE, Array, Benchmark, Method
+from fractalcontact.accuracy._benchmarks._benchmark import TOLERANCE, Array, Benchmark, Method, largest_error
 
 RIPPLE = 0.6  # amplitude of the sinusoidal aperture over its mean
 APERTURE = 1e-4  # m
@@ -21,18 +21,17 @@ def benchmarks() -> tuple[Benchmark, ...]:
     """Return the benchmarks of flow, dilatancy and closure."""
     sizes = (8, 16, 32, 64, 128, 256, 512)
     wrapped = partial(_corrugated, periodic=True)
-    across = Method("transmissivity, across", sizes, _corrugated, _hydraulic_aperture, _across_error)
-    around = Method(
-        "transmissivity, across, periodic", sizes[:5], wrapped, _hydraulic_aperture, _across_error
-    )
-    board = Method(
-        "transmissivity, checkerboard", sizes[:5], _checkerboard, _hydraulic_aperture, _checkerboard_error
-    )
-    rigid = Method("rigid dilatancy", sizes[1:], _wave_joint, _rigid_dilatancy, _dilatancy_error)
+    exact = APERTURE * ((1.0 - RIPPLE**2) ** 2.5 / (1.0 + RIPPLE**2 / 2.0)) ** (1.0 / 3.0)
+    error = largest_error(exact, relative=True)
+    across = Method("transmissivity, across", sizes, _corrugated, _hydraulic_aperture, error)
+    around = Method("transmissivity, across, periodic", sizes[:5], wrapped, _hydraulic_aperture, error)
+    error = largest_error(APERTURE, relative=True)
+    board = Method("transmissivity, checkerboard", sizes[:5], _checkerboard, _hydraulic_aperture, error)
+    error = largest_error(2.0 * np.sin(np.pi * SHEAR))
+    rigid = Method("rigid dilatancy", sizes[1:], _wave_joint, _rigid_dilatancy, error)
     tolerances = tuple(10.0**-k for k in range(2, 11))
-    closure = Method(
-        "closure of the interface", tolerances, _sheared_joint, _closure, _closure_error, TOLERANCE
-    )
+    error = largest_error(lambda _: _exact_closure(), relative=True)
+    closure = Method("closure of the interface", tolerances, _sheared_joint, _closure, error, TOLERANCE)
     return (
         Benchmark(
             "sinusoidal aperture, across",
@@ -76,15 +75,6 @@ def _hydraulic_aperture(gap: xr.DataArray) -> float:
     return float(joints.transmissivity(gap)["hydraulic_aperture"].sel(axis="x"))
 
 
-def _across_error(aperture: float, _: float) -> float:
-    exact = ((1.0 - RIPPLE**2) ** 2.5 / (1.0 + RIPPLE**2 / 2.0)) ** (1.0 / 3.0)
-    return float(abs(aperture / APERTURE / exact - 1.0))
-
-
-def _checkerboard_error(aperture: float, _: float) -> float:
-    return float(abs(aperture / APERTURE - 1.0))
-
-
 def _wave_joint(n: float) -> joints.Crack:
     x = np.arange(int(n)) / n
     heights = np.broadcast_to(np.cos(2 * np.pi * x), (8, int(n)))
@@ -93,10 +83,6 @@ def _wave_joint(n: float) -> joints.Crack:
 
 def _rigid_dilatancy(crack: joints.Crack) -> float:
     return float(joints.dilatancy(crack, shear=[SHEAR], direction="E")["rigid_dilatancy"].squeeze())
-
-
-def _dilatancy_error(dilatancy: float, _: float) -> float:
-    return float(abs(dilatancy - 2.0 * np.sin(np.pi * SHEAR)))
 
 
 def _sheared_joint(tolerance: float) -> tuple[joints.Crack, float]:
@@ -115,7 +101,3 @@ def _closure(problem: tuple[joints.Crack, float]) -> Array:
 @lru_cache(maxsize=1)
 def _exact_closure() -> Array:
     return _closure(_sheared_joint(1e-13))
-
-
-def _closure_error(closure: Array, _: float) -> float:
-    return float(np.abs(closure / _exact_closure() - 1.0).max())
