@@ -44,7 +44,7 @@ from fractalcontact.base.provenance import stamp, with_load_indexes
 from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import STOP_REASONS, label
 from fractalcontact.base.surface_argument import with_surface
-from fractalcontact.base.validation import Problems, did_you_mean, flags_of
+from fractalcontact.base.validation import Problems, did_you_mean
 
 MASKS = ("mask", "masks", "valid")
 P = ParamSpec("P")
@@ -108,7 +108,8 @@ def public_result(
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
         signature = inspect.signature(function)
         name = public_name(function)
-        flags = flags_of(signature)
+        # no word is true: what is declared as a flag is True or False
+        flags = sorted(word for word, given in signature.parameters.items() if given.annotation == "bool")
 
         def checked(*arguments: Any, **options: Any) -> inspect.BoundArguments:
             try:

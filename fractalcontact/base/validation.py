@@ -23,8 +23,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
-from inspect import Signature
-from math import isfinite
 from os import R_OK, PathLike, access, fsencode, fspath
 from pathlib import Path
 from types import SimpleNamespace, TracebackType
@@ -42,6 +40,13 @@ if TYPE_CHECKING:
     from fractalcontact.base.grid import Grid
 
 T = TypeVar("T")
+# bounds of numbers, in the order of their words
+COMPARISONS = {
+    "above": (">", np.greater),
+    "at_least": (">=", np.greater_equal),
+    "below": ("<", np.less),
+    "at_most": ("<=", np.less_equal),
+}
 LARGEST_INTEGER = 1 << 53  # larger integers are not all representable as float64
 LONGEST_NAME, LONGEST_PATH = 255, 4096  # bytes of a file name and of a path that file systems hold
 
@@ -140,42 +145,28 @@ class Problems:
             self.add(argument, expected, got)
         return bool(condition)
 
-    def number(
-        self,
-        argument: str,
-        value: Any = GIVEN,
-        *,
-        above: float | None = None,
-        at_least: float | None = None,
-        below: float | None = None,
-        at_most: float | None = None,
-        optional: bool = False,
-    ) -> bool:
-        """Check for one finite real number inside the bounds; `optional` allows None."""
+    def number(self, argument: str, value: Any = GIVEN, *, optional: bool = False, **bounds: Any) -> bool:
+        """Check for one finite real number inside the bounds; `optional` allows None.
+
+        The bounds are `above`, `at_least`, `below` and `at_most`.
+        """
         value = self._value(argument, value)
         if value is None and optional:
             return True
-        if type(value) is float and isfinite(value):  # as most are, and a tenth of the time
-            inside = (above is None or value > above) and (at_least is None or value >= at_least)
-            if inside and (below is None or value < below) and (at_most is None or value <= at_most):
-                return True
         if number_of_axes(value) != 0:
             self.add(argument, "one number", value)
             return False
-        return self.numbers(argument, value, above=above, at_least=at_least, below=below, at_most=at_most)
+        return self.numbers(argument, value, **bounds)
 
     def numbers(
         self,
         argument: str,
         value: Any = GIVEN,
         *,
-        above: float | None = None,
-        at_least: float | None = None,
-        below: float | None = None,
-        at_most: float | None = None,
         optional: bool = False,
         integral: bool = False,
         any_shape: bool = False,
+        **bounds: float | None,
     ) -> bool:
         """Check for one or several finite real numbers inside the bounds; `float_array` converts them.
 
@@ -184,7 +175,7 @@ class Problems:
         value = self._value(argument, value)
         if value is None and optional:
             return True
-        expected = _interval(above, at_least, below, at_most)
+        expected = _interval("a finite number", **bounds)
         values = real_numbers(value)
         if values is None or values.size == 0:
             self.add(argument, expected, value if values is None else "an empty sequence")
@@ -193,10 +184,8 @@ class Problems:
             self.add(argument, "a number or a 1-D sequence", f"an array of shape {values.shape}")
             return False
         good = np.isfinite(values)
-        good &= True if above is None else values > above
-        good &= True if at_least is None else values >= at_least
-        good &= True if below is None else values < below
-        good &= True if at_most is None else values <= at_most
+        for name, bound in bounds.items():
+            good &= True if bound is None else COMPARISONS[name][1](values, bound)
         if not good.all():
             self.add(argument, expected, values[~good][0])
         if integral:
@@ -225,7 +214,9 @@ class Problems:
             high = LARGEST_INTEGER if at_most is None else at_most
             inside = low <= int(value) <= high
             at_most = high if int(value) > high else at_most
-        return self.require(inside, argument, _interval(None, at_least, None, at_most, "an integer"), value)
+        return self.require(
+            inside, argument, _interval("an integer", at_least=at_least, at_most=at_most), value
+        )
 
     def boolean(self, argument: str, value: Any = GIVEN, *, optional: bool = False) -> bool:
         """Check for True or False; `optional` allows None."""
@@ -385,11 +376,6 @@ class Problems:
         return self.require(allowed, "periodic", expected, value)
 
 
-def flags_of(signature: Signature) -> list[str]:
-    """Return the names of the arguments that a signature declares as `bool`, sorted: no word is true."""
-    return sorted(name for name, parameter in signature.parameters.items() if parameter.annotation == "bool")
-
-
 @contextmanager
 def reading(where: str, path: str | PathLike[str]) -> Iterator[None]:
     """Raise `UnreadableFile` for an error of the file system in the block: no permission, a bad disk."""
@@ -431,19 +417,10 @@ def did_you_mean(word: object, words: Iterable[str]) -> str:
     return f" (did you mean {near[0]!r}?)" if near and near[0] != word else ""
 
 
-def _interval(
-    above: float | None,
-    at_least: float | None,
-    below: float | None,
-    at_most: float | None,
-    what: str = "a finite number",
-) -> str:
-    bounds = [
-        f"{sign} {bound:g}"
-        for sign, bound in ((">", above), (">=", at_least), ("<", below), ("<=", at_most))
-        if bound is not None
-    ]
-    return " ".join([what, " and ".join(bounds)]).strip()
+def _interval(what: str, **bounds: float | None) -> str:
+    """Return what is expected between bounds, in words."""
+    given = [(sign, bounds[name]) for name, (sign, _) in COMPARISONS.items() if bounds.get(name) is not None]
+    return " ".join([what, " and ".join(f"{sign} {bound:g}" for sign, bound in given)]).strip()
 
 
 def _quoted(words: Iterable[str]) -> str:
