@@ -231,7 +231,7 @@ def _answer(options: argparse.Namespace) -> int:
         first = Path(scan[0] if isinstance(scan, list) else scan)
         stem = first.resolve().parent.name.replace("*", "") if several else first.name.partition(".")[0]
         folder = f"{stem}_{options.question}"
-    arguments = {name: value for name, value in vars(options).items() if name in TEMPLATE_ARGUMENTS}
+    arguments = {name: getattr(options, name) for name in TEMPLATE_ARGUMENTS if hasattr(options, name)}
     if arguments.get("young", SOFTEST) < SOFTEST:
         message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
         warnings.warn(message, ScaleWarning, stacklevel=2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.resources
 import json
 import math
 import os
@@ -25,8 +26,6 @@ QUESTIONS = ("roughness", "contact", "joint")
 JRC_LAG = 0.508e-3  # m: the interval of the readings of Tse and Cruden
 JRC_LENGTHS = 10  # least number of intervals along a surface
 LIGHT, FULL = 1e-3, 0.2  # fractions of true contact of the default loads
-PRESSURES = (1e5, 1e7)  # Pa: usual loads of a joint
-TESTED = (1e6, 3e6)  # Pa: further loads of a shear test
 TRAVEL_POINTS = 60  # of a curve of the rigid dilatancy, which costs milliseconds
 
 
@@ -137,30 +136,37 @@ def template(
         prepared["fill"] = True
     if not is_joint and (level is not None or not (facts["periodic"] or facts["in_plane"])):
         prepared["level"] = 1 if level is None else level
-    tables = [("surface", _file_table(scan, folder, options | prepared))]
+    faces = {"surface": _file_table(scan, folder, options | prepared)}
     if is_joint:
         if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
             options = {key: value for key, value in options.items() if key != "spacing"} | {
                 "plane": OF_SURFACE
             }
-        tables.append(("upper", _file_table(upper or "", folder, options | prepared)))
+        faces["upper"] = _file_table(upper or "", folder, options | prepared)
+    material: dict[str, float | None] = {}
     if is_pressed:
-        material = {"young": float(young or 0.0), "poisson": float(poisson)}
-        if is_joint and friction_angle is not None:
-            material["basic_friction_angle"] = float(friction_angle)
-        if is_joint and wall_strength is not None:
-            material["yield_pressure"] = float(wall_strength)  # true pressures beyond it are named
-        tables.append(("material", material))
+        material = {"young": young, "poisson": poisson}
+    if is_joint:  # true pressures beyond the strength of the walls are named
+        material |= {"basic_friction_angle": friction_angle, "yield_pressure": wall_strength}
     if is_joint:
-        tables += _joint(facts, register, turn_upper, wall_strength)
+        values = _travel(facts)
     else:
-        tables += _contact(facts, young, poisson) if is_pressed else _roughness(facts)
+        values = _loads(facts, young, poisson) if is_pressed else _roughness(facts)
     names = [_words(each) for each in ((scan, upper) if is_joint and upper else (scan,))]
-    files = " and ".join(dict.fromkeys(names))
-    text = [f"title = {json.dumps(f'{question.capitalize()} of {files}')}", ""]
-    for name, table in tables:
-        text += [f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items()), ""]
-    return "\n".join(text)
+    values["title"] = f"{question.capitalize()} of {' and '.join(dict.fromkeys(names))}"
+    values |= {"turn_upper": turn_upper, "register": register}
+    values["material"] = {key: float(value) for key, value in material.items() if value is not None}
+    return _scene(question=question, faces=faces, **values)
+
+
+def _scene(**values: Any) -> str:
+    """Return the text of a scene."""
+    from jinja2 import Environment  # only here and for the report
+
+    template = importlib.resources.files("fractalcontact.scenes").joinpath("question.toml.jinja")
+    environment = Environment(trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment.filters["toml"] = _toml
+    return environment.from_string(template.read_text(encoding="utf-8")).render(values)
 
 
 def _files(scan: Files) -> list[Path]:
@@ -231,67 +237,36 @@ def _file_table(scan: Files, folder: str | os.PathLike[str], options: Mapping[st
     return {"read": paths if isinstance(scan, (list, tuple)) else paths[0], **options}
 
 
-def _roughness(facts: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    want: dict[str, Any] = {
-        "surfaces": ["height", "describe", "texture"],
-        "dimensions": ["default", "variogram"],
-    }
+def _roughness(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return whether the points resolve JRC, and warn where those of a long face do not."""
     is_long, spacing = facts["extent"] >= JRC_LENGTHS * JRC_LAG, facts["spacing"]
-    if is_long and spacing <= JRC_LAG:
-        want["joints"] = ["roughness_coefficient", "directional_roughness"]
-    elif is_long:
+    if is_long and spacing > JRC_LAG:
         lag, distance = quantity_text(JRC_LAG, "m"), quantity_text(spacing, "m")
         message = f"JRC is left out: its readings are {lag} apart, and the points of this face {distance}"
         warnings.warn(message, FractalContactWarning, stacklevel=3)
-    return [("want", want | {"figures": True})]
+    return {"has_jrc": is_long and spacing <= JRC_LAG}
 
 
-def _contact(facts: Mapping[str, Any], young: Any, poisson: float) -> list[tuple[str, dict[str, Any]]]:
+def _loads(facts: Mapping[str, Any], young: Any, poisson: float) -> dict[str, Any]:
+    """Return the ends of the path of the load on a flat."""
     # a fraction of true contact needs about half of it times modulus and rms slope (Bush; Persson)
     modulus = 0.5 * float(young) / (1.0 - poisson**2)
     unit = 0.5 * modulus * max(facts["slope"], 1e-12)
-    loads = {"first": _rounded(LIGHT * unit), "last": _rounded(FULL * unit), "count": 8}
-    want = {
-        "surfaces": ["height", "describe"],
-        "contact": ["press"],
-        "domains": ["box_dimension", "islands"],
-        "keep": ["state"],
-        "figures": True,
-    }
-    return [("contact", {"nominal_pressure": loads}), ("want", want)]
+    return {"first": _rounded(LIGHT * unit), "last": _rounded(FULL * unit)}
 
 
-def _joint(
-    facts: Mapping[str, Any], register: bool, turn_upper: str | None, strength: float | None
-) -> list[tuple[str, dict[str, Any]]]:
+def _travel(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the block of a joint, its shears, and the range of its travel."""
     step = facts["spacing"]
     block = step * math.floor(0.6 * facts["extent"] / step)
     farthest = step * math.floor(0.15 * facts["extent"] / step)
     shears = [0.0, *(_rounded(step * max(1, round(share * farthest / step))) for share in (0.1, 0.3, 1.0))]
-    joint = {"block": float(f"{block:.9g}"), "register": register, "shear": sorted(set(shears))}
-    joint |= {} if turn_upper is None else {"turn_upper": turn_upper}
-    loads = {"nominal_pressure": {"first": PRESSURES[0], "last": PRESSURES[1], "count": 6}}
-    travel = {"start": 0.0, "stop": _rounded(farthest), "step": _rounded(max(step, farthest / TRAVEL_POINTS))}
-    dilatancy = {"direction": ["E", "N", "W", "S"], "shear": travel}
-    want: dict[str, Any] = {
-        "surfaces": ["height", "describe"],
-        "joints": ["closure", "rigid_dilatancy", "transmissivity"],
-        "keep": ["state"],
-        "figures": True,
+    return {
+        "block": _rounded(block),
+        "shears": sorted(set(shears)),
+        "farthest": _rounded(farthest),
+        "step": _rounded(max(step, farthest / TRAVEL_POINTS)),
     }
-    tables: list[tuple[str, dict[str, Any]]] = [
-        ("joint", joint),
-        ("joint.closure", loads),
-        ("joint.rigid_dilatancy", dilatancy),
-    ]
-    if strength is not None:
-        criteria = {"wall_strength": float(strength), **loads}
-        ends = [_rounded(pressure) for pressure in PRESSURES[1:] + TESTED]
-        test = {"path": _rounded(farthest), "nominal_pressure": sorted(ends), "hardness": float(strength)}
-        tables += [("joint.strength_envelope", criteria), ("joint.direct_shear", test)]
-        want["joints"] += ["strength_envelope", "direct_shear"]
-        want["datasheet"] = True
-    return [*tables, ("want", want)]
 
 
 def _rounded(value: float) -> float:
@@ -300,8 +275,6 @@ def _rounded(value: float) -> float:
 
 def _toml(value: Any) -> str:
     """Return a value as TOML."""
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_toml(item)}" for key, item in value.items()) + " }"
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, (list, tuple)):
