@@ -45,8 +45,8 @@ class Result:
     error: float = np.nan
 
 
-def examine(case: Case) -> list[Result]:
-    """Run every function that takes the input of a case, and compare the results with what is expected.
+def examine(case: Case, only: str = "") -> list[Result]:
+    """Run the functions that take the input of a case, or one, and compare with what is expected.
 
     There is one result for each expected quantity, and one for each function. A function passes if it
     returns finite numbers, or NaN with a reason, or refuses the input with an `InvalidInput`.
@@ -57,7 +57,7 @@ def examine(case: Case) -> list[Result]:
         call = cache(case.make)  # one call serves all quantities
         return [result for name in functions for result in _run(case, name, lambda *_: call())]
     probes = SURFACE_PROBES if case.input_type == "surface" else MASK_PROBES
-    results = [result for name, probe in probes.items() for result in _run(case, name, probe)]
+    results = [result for name, probe in probes.items() if only in name for result in _run(case, name, probe)]
     unknown = [quantity for quantity in case.expected if _function_of(quantity) not in probes]
     return results + [Result(name, case.expected[name], "no such function", False, 0.0) for name in unknown]
 

@@ -26,9 +26,9 @@ def measured():
 
     def measure(part):
         if part not in results:
-            start = time.perf_counter()
-            tree = fc.accuracy.measure(part, budget=1)
-            assert time.perf_counter() - start < 60
+            start = time.process_time()  # unlike the time of the clock the same beside other processes
+            tree = fc.accuracy.measure(part, budget=0.1)
+            assert time.process_time() - start < 60
             results[part] = tree
         return results[part]
 

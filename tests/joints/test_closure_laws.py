@@ -216,8 +216,9 @@ def test_law_is_seldom_preferred_where_both_are_as_good():
     assert 0.0 < float(decided) < 0.08
 
 
-def test_intervals_have_their_coverage():
-    """95 % of 1000 scattered paths; the standard error of the share is 0.7 %."""
+@pytest.mark.parametrize(("paths", "slack"), [(300, 0.035), pytest.param(1000, 0.02, marks=pytest.mark.slow)])
+def test_intervals_have_their_coverage(paths, slack):
+    """95 % of scattered paths; the standard error of the share is 1.3 % for 300 and 0.7 % for 1000 paths."""
     p = np.geomspace(1e5, 1e7, 10)
     truth = {
         "closure_length": 3e-6, "reference_pressure": 2e4,
@@ -229,7 +230,7 @@ def test_intervals_have_their_coverage():
     }
     rng = np.random.default_rng(4)
     for name, curve in curves.items():
-        closures = curve + 0.02 * np.ptp(curve) * rng.standard_normal((1000, p.size))
+        closures = curve + 0.02 * np.ptp(curve) * rng.standard_normal((paths, p.size))
         result = fc.joints.closure_laws(
             xr.Dataset(
                 {"interface_closure": (("joint", "step"), closures)},
@@ -239,7 +240,7 @@ def test_intervals_have_their_coverage():
         for constant in list(truth)[:2] if name == "exponential" else list(truth)[2:]:
             low, high = result[f"{constant}_low"], result[f"{constant}_high"]
             covered = ((low < truth[constant]) & (truth[constant] < high)).mean()
-            assert 0.93 < float(covered) < 0.97, constant
+            assert abs(float(covered) - 0.95) < slack, constant
 
 
 def test_interval_without_bound_where_nothing_curves():
