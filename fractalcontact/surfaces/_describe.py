@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.coords import check_leading, leading_coords
+from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import scaled_slopes, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.surfaces._height_planes import check_planes, labelled_rows
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
 
@@ -31,14 +32,10 @@ HEIGHT_STATISTICS = (
 
 
 def _check(problems: Problems) -> None:
-    given = problems.given
-    valid = problems.surface("surface", finite=False, leading=True, profile=True)
-    if isinstance(given.surface, xr.DataArray):
-        check_leading(given.surface, _result_names(len(core_dims(given.surface))), problems)
-    if valid:
-        infinite = int(np.count_nonzero(np.isinf(given.surface.values)))
-        expected = "finite heights, or NaN where missing"
-        problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
+    surface = problems.given.surface
+    check_planes(problems, smallest=3)
+    if isinstance(surface, xr.DataArray):
+        check_leading(surface, _result_names(len(core_dims(surface))), problems)
 
 
 @public_result(
@@ -100,18 +97,10 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     7.071e-07 m, 0.0694
     """
     grid = read_grid(surface, core_dims(surface))
-    leading = surface.dims[: surface.ndim - len(grid.shape)]
     planes = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
-    rows = [_statistics(plane, grid.spacing, grid.periodic) for plane in planes]
-    lengths = surface.shape[: len(leading)]
-    values = {name: np.array([row[name] for row in rows]).reshape(lengths) for name in rows[0]}
-    values["missing_points"] = values["missing_points"].astype(np.int64)
+    result = labelled_rows(surface, [_statistics(plane, grid.spacing, grid.periodic) for plane in planes])
     by_modes = all(grid.periodic) and not np.isnan(planes).any()
-    result = xr.Dataset(
-        {name: (leading, value) for name, value in values.items()},
-        leading_coords(surface, leading, _result_names(len(grid.shape))),
-        {"derivatives": "modes" if by_modes else "differences"},
-    )
+    result.attrs["derivatives"] = "modes" if by_modes else "differences"
     _explain_missing(result, planes)
     return result
 
@@ -143,11 +132,11 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     """
     complete = not np.isnan(heights.min())
     if not complete and np.isnan(heights).all():
-        result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {"missing_points": float(heights.size)}
+        result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {"missing_points": heights.size}
         return result | dict.fromkeys(_gradient_names(heights.ndim), math.nan)
     values, reference, scale = shifted(heights)
     result = _heights(values if complete else values[~np.isnan(values)], reference, scale)
-    result["missing_points"] = 0.0 if complete else float(np.count_nonzero(np.isnan(values)))
+    result["missing_points"] = 0 if complete else int(np.count_nonzero(np.isnan(values)))
     unit = math.ldexp(1.0, math.frexp(max(spacing))[1])
     steps = [step / unit for step in spacing]
     ratio = scale / unit

@@ -9,13 +9,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
-from fractalcontact.base.coords import check_leading, leading_coords
+from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes
+from fractalcontact.surfaces._height_planes import check_planes, height_planes, labelled_rows
 
 DECAY = 0.2  # of the autocorrelation at the lengths
 _CORE_WIDTH = 0.4  # of the material ratio under the secant of the core
@@ -94,15 +94,10 @@ def texture(surface: xr.DataArray) -> xr.Dataset:
     9.86e-05 m, 0.87
     """
     grid = read_grid(surface, core_dims(surface))
-    leading = surface.dims[: surface.ndim - len(grid.shape)]
     planes = height_planes(surface)
     rows = [_correlation(plane, grid.spacing, grid.periodic) + _core(plane) for plane in planes]
-    sizes = surface.shape[: len(leading)]
-    data = {
-        name: (leading, np.array([row[k] for row in rows]).reshape(sizes))
-        for k, name in enumerate((*_CORRELATION, *_CORE))
-    }
-    result = xr.Dataset(data, coords=leading_coords(surface, leading, (*data, "run_time")))
+    names = (*_CORRELATION, *_CORE)
+    result = labelled_rows(surface, [dict(zip(names, row, strict=True)) for row in rows])
     for name, variable in result.data_vars.items():
         if bool(np.isnan(variable).any()):
             variable.attrs["reason"] = _reason(str(name), len(grid.shape))
