@@ -12,7 +12,6 @@ from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 
-PASSES = 20
 # a quantile of the absolute residual, and the standard deviation of a Gaussian over it; the median called a
 # third of a coin and of heights of a few steps spikes
 SHARE, GAUSSIAN = 0.9, 0.6080
@@ -111,16 +110,11 @@ def _spikes(heights: Array, window: int, threshold: float) -> tuple[Array, float
     # without this a slope would flag the points beside a missing one
     heights = detrended(heights, 1)[0]
     flagged = np.zeros(heights.shape, dtype=bool)
-    remaining, deviation = heights.copy(), 0.0
-    for number in range(PASSES):
-        residual = np.abs(heights - _medians(remaining, window))
-        if number == 0:
-            deviation = GAUSSIAN * float(np.nanquantile(residual, SHARE))
-        new = (residual > threshold * deviation) & ~flagged
-        if deviation == 0 or not new.any():
-            break
+    residual = np.abs(heights - _medians(heights, window))
+    deviation = GAUSSIAN * float(np.nanquantile(residual, SHARE))
+    while deviation > 0 and (new := (residual > threshold * deviation) & ~flagged).any():
         flagged |= new
-        remaining[flagged] = np.nan
+        residual = np.abs(heights - _medians(np.where(flagged, np.nan, heights), window))
     return flagged, deviation
 
 

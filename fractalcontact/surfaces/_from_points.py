@@ -29,7 +29,7 @@ OFF_NODE = 0.05  # largest distance of a point from its node on a uniform grid, 
 EXACT = 1e-6  # of the extent: smaller differences of positions are rounding
 SCATTER = 0.2  # of the largest jump between positions: smaller ones are scatter about a node
 OCCUPIED = 0.5  # least share of the nodes of a uniform grid that have a point
-MOST_CELLS = 1 << 28
+MOST_CELLS = 1 << 28  # 2 GB of heights
 
 
 def _check(problems: Problems) -> None:
