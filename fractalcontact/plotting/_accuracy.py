@@ -106,13 +106,13 @@ def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:
     if isinstance(measured, xr.DataTree) and measured.children:
         groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
-        groups = {"": as_dataset(measured, "error_against_time", "measured")}
+        groups = {"": as_dataset(measured, "measured")}
     if units is not None:
-        require_units(groups.values(), units, "error_against_time")
+        require_units(groups.values(), units)
         groups = {prefix: marked(data, units) for prefix, data in groups.items()}
     benchmarks = {}
     for prefix, data in groups.items():
-        require_variables(data, "error_against_time", MEASURED, "measured")
+        require_variables(data, MEASURED, "measured")
         names = np.asarray(words(data["benchmark"]))
         for name in dict.fromkeys(names.tolist()):
             benchmarks[f"{prefix}{name}"] = data.isel(method=np.flatnonzero(names == name))
@@ -161,9 +161,9 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
     >>> print(upper.get_title(), "|", lower.get_xlabel())
     fbm, n = 128 | true Hurst exponent
     """
-    data = result_of(bench, "estimator_errors", tuple(QUANTITIES), ("method",), argument="bench")
-    require_dims(data, "estimator_errors", {dim: dim for dim in CASES}, "bench")
-    with Problems("fc.plotting.estimator_errors") as problems:
+    data = result_of(bench, tuple(QUANTITIES), ("method",), argument="bench")
+    require_dims(data, {dim: dim for dim in CASES}, "bench")
+    with Problems("fc.plotting") as problems:
         for dim in CASES:
             problems.require(data.sizes[dim] > 0, f"bench.{dim}", "at least one entry", NONE)
     families, sizes = words(data["family"]), data["size"].values

@@ -71,10 +71,10 @@ def closure_laws(
     """
     if laws is not None:
         return _draw_laws(closure, laws, key, log, units, ax)
-    data = result_of(closure, "closure_laws", ("closure", "normal_force"), PATH, units, "closure")
+    data = result_of(closure, ("closure", "normal_force"), PATH, units, "closure")
     total, force = quantity(data, "closure", PATH, "closure"), quantity(data, "normal_force", PATH)
     last = force.values.shape[1] - 1
-    with Problems("fc.plotting.closure_laws") as problems:
+    with Problems("fc.plotting") as problems:
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
     panel = LinePanel(_style.axes_or_new(ax), total, force, by_shear(data))
     inner = total.values
@@ -96,11 +96,11 @@ def closure_laws(
 def _draw_laws(closure: Any, laws: Any, key: bool, log: bool, units: Units | None, ax: Axes | None) -> Axes:
     """Draw the steps of each shear and both laws through them."""
     names = ("interface_closure", "nominal_pressure")
-    data = result_of(closure, "closure_laws", names, PATH, units, "closure")
-    fitted = result_of(laws, "closure_laws", (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
+    data = result_of(closure, names, PATH, units, "closure")
+    fitted = result_of(laws, (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
     closed, pressure = (quantity(data, name, PATH) for name in names)
     points, count = closed.values, len(closed.values)
-    with Problems("fc.plotting.closure_laws") as problems:
+    with Problems("fc.plotting") as problems:
         same = fitted.sizes["shear"] == count
         problems.require(same, "laws", f"{count} shears, as of the closure", fitted.sizes["shear"])
     if "seated_closure" in fitted:

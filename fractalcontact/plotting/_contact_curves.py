@@ -62,8 +62,8 @@ def contact_area(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | real / nominal contact area (%)
     """
-    data = result_of(result, "contact_area", ("contact_fraction", against), PATH, units)
-    loads = _paths.loads_of(data, against, "contact_area")
+    data = result_of(result, ("contact_fraction", against), PATH, units)
+    loads = _paths.loads_of(data, against)
     cells = quantity(data, "contact_fraction", PATH, "real / nominal contact area")
     panel = LinePanel(_style.axes_or_new(ax), loads, cells, _paths.by_shear(data))
     if "corrected_contact_fraction" in data:
@@ -74,7 +74,7 @@ def contact_area(
     else:
         panel.curves("cell count", loads.values, cells.values)
     if theory is not None:
-        _draw_theories(panel, theory, "contact_area", "contact_fraction", against)
+        _draw_theories(panel, theory, "contact_fraction", against)
     if log and against != "closure":
         _draw_proportional(panel, loads.values, cells.values)
     return panel.finish(log="xy" if log else "", zero="" if log else "xy", title="contact area")
@@ -90,9 +90,9 @@ def _draw_proportional(panel: LinePanel, x: Any, y: Any) -> None:
         panel.line(name, ends, ends * slope, key=name, marker="", color=_style.grey(), **_style.DOTTED)
 
 
-def _draw_theories(panel: LinePanel, theory: Any, where: str, name: str, against: str) -> None:
+def _draw_theories(panel: LinePanel, theory: Any, name: str, against: str) -> None:
     """Draw a variable of each theory that gives one."""
-    data = result_of(theory, where, (name, "theory", against), ("theory", "step"), argument="theory")
+    data = result_of(theory, (name, "theory", against), ("theory", "step"), argument="theory")
     loads, values = table(data, against, ("step",)), table(data, name, ("theory", "step"))
     colours = _style.cycle()
     for i, word in enumerate(words(data["theory"])):
@@ -146,8 +146,8 @@ def path(
     """
     names = (variable,) if isinstance(variable, str) else tuple(variable)
     given = () if against is None else (against,)
-    data = result_of(result, "path", (*names, *given), PATH, units)
-    dims, x, family = _paths.path_axis(data, against, "path")
+    data = result_of(result, (*names, *given), PATH, units)
+    dims, x, family = _paths.path_axis(data, against)
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
     y = quantity(data, names[0], dims, title, np.array(values))
@@ -159,9 +159,7 @@ def path(
             low, high = (table(data, f"{name}_{end}", dims)[0] for end in ("low", "high"))
             panel.band(f"{title}, interval", x.values[0], low, high, family.styles[0]["color"])
     if theory is not None:
-        _draw_theories(
-            panel, theory, "path", OF_THEORY.get(names[0], names[0]), against or _paths.load_of(data)
-        )
+        _draw_theories(panel, theory, OF_THEORY.get(names[0], names[0]), against or _paths.load_of(data))
     wide = "".join(
         axis for axis, shown in (("x", x.values), ("y", np.array(values))) if needs_log_axis(shown)
     )
@@ -194,9 +192,9 @@ def pressure_distribution(
     pressure (MPa) | nominal area per pressure (1/MPa)
     """
     names = ("area_share", "maximum_pressure", "pressure_class", "nominal_pressure")
-    data = result_of(result, "pressure_distribution", names, ("step",), units)
-    require_dims(data, "pressure_distribution", {"area_share": "pressure_class"})
-    with Problems("fc.plotting.pressure_distribution") as problems:
+    data = result_of(result, names, ("step",), units)
+    require_dims(data, {"area_share": "pressure_class"})
+    with Problems("fc.plotting") as problems:
         count = data.sizes["pressure_class"]
         problems.require(count > 0, "result.pressure_class", "at least one entry", NONE)
     data = data.isel(step=_style.spread_indices(data.sizes["step"], _style.MOST_CURVES))
@@ -209,9 +207,7 @@ def pressure_distribution(
     y = Quantity(share, per_pressure, "nominal area per pressure")
     spread = None
     if theory is not None:
-        spread = float(
-            result_of(theory, "pressure_distribution", ("pressure_spread",), ())["pressure_spread"]
-        )
+        spread = float(result_of(theory, ("pressure_spread",), ())["pressure_spread"])
     family = _paths.by_load(data.drop_vars("normal_force", errors="ignore"))
     panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=0)
     for i in np.flatnonzero(greatest > 0).tolist():
@@ -261,7 +257,7 @@ def area_dimension(
     spacing (µm) | real contact area (%)
     """
     names = ("contact_fraction", "corrected_contact_fraction", "resolution")
-    result = result_of(result, "area_dimension", names, ("shear", "step", "resolution"), units)
+    result = result_of(result, names, ("shear", "step", "resolution"), units)
     data, dims = _paths.at_shear(result, shear), ("step", "resolution")
     spacing = quantity(data, "resolution", ("resolution",), "spacing")
     cells = quantity(data, "contact_fraction", dims)
@@ -306,7 +302,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     tangential force $Q$ (N)
     """
     names = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
-    data = result_of(result, "slip_loops", names, PATH, units)
+    data = result_of(result, names, PATH, units)
     force, displacement = (quantity(data, name, PATH) for name in names[:2])
     stuck, contact = (table(data, name, PATH) for name in names[2:])
     share = stuck / np.where(contact > 0, contact, np.nan)

@@ -86,7 +86,7 @@ def datasheet(
     [8.27, 11.69]
     """
     found = {name: group_of(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
-    with Problems("fractalcontact.plotting.datasheet") as problems:
+    with Problems("fc.plotting") as problems:
         expected = f"at least one of joints/{', joints/'.join(found)}"
         problems.require(any(data is not None for data in found.values()), "tree", expected, NONE)
     import matplotlib.style

@@ -58,7 +58,7 @@ def dilatancy(
     >>> print(ax.get_ylabel(), "|", len(ax.lines), "curves")
     dilatancy $\delta$ (µm) | 3 curves
     """
-    data = _paths.select_direction(dilatancy, direction, "dilatancy", units, "dilatancy")
+    data = _paths.select_direction(dilatancy, direction, units, "dilatancy")
     data = _paths.limit_shear(data, reach)
     if "dilatancy" in data:
         return _of_elastic_bodies(data, marked, ax)
@@ -67,7 +67,7 @@ def dilatancy(
 
 def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     dims = ("direction", "shear")
-    data = result_of(data, "dilatancy", ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
+    data = result_of(data, ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
     shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "rigid_dilatancy", dims)
     panel = LinePanel(_style.axes_or_new(ax), shear, opening, _paths.by_direction(data))
     panel.curves("rigid dilatancy", shear.values, opening.values)
@@ -80,7 +80,7 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
 
 
 def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> Axes:
-    data = result_of(data, "dilatancy", ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
+    data = result_of(data, ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
     shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "dilatancy", ("step", "shear"))
     loads, points = _paths.by_load(data), _style.MAX_MARKED_POINTS
     panel = LinePanel(_style.axes_or_new(ax), shear, opening, loads, points)
@@ -127,7 +127,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     shear displacement $v$ (mm) | correlation of the faces
     """
     names, dims = ("correlation", "shear", *LENGTHS), ("direction", "shear")
-    data = result_of(memory, "correlation", names, dims, units, "memory")
+    data = result_of(memory, names, dims, units, "memory")
     shear, values = (
         quantity(data, "shear", ("shear",)),
         quantity(data, "correlation", dims, "correlation of the faces"),
@@ -165,7 +165,7 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (mm) | dimension of the delta-surface
     """
-    data = result_of(dimension, "delta_dimension", (*DIMENSIONS, "shear"), ("shear",), units, "dimension")
+    data = result_of(dimension, (*DIMENSIONS, "shear"), ("shear",), units, "dimension")
     shear = quantity(data, "shear", ("shear",))
     values = quantity(data, DIMENSIONS[0], ("shear",), "dimension of the delta-surface")
     methods = distinct([name.split("_")[0] for name in DIMENSIONS], "method")

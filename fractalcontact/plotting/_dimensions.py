@@ -97,15 +97,15 @@ def _curves_in(
     else:
         is_one = not isinstance(curves, Mapping) or isinstance(curves, xr.Dataset | xr.DataTree)
         given = {"": curves} if is_one else curves
-    datasets = {str(name): as_dataset(curve, "dimension_curves", "curves") for name, curve in given.items()}
+    datasets = {str(name): as_dataset(curve, "curves") for name, curve in given.items()}
     if units is not None:
-        require_units(datasets.values(), units, "dimension_curves")
+        require_units(datasets.values(), units)
         datasets = {name: marked(curve, units) for name, curve in datasets.items()}
     datasets = {name or curve_of(curve)[1]: curve for name, curve in datasets.items() if curve_of(curve)[1]}
-    with Problems("fc.plotting.dimension_curves") as problems:
+    with Problems("fc.plotting") as problems:
         problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", NONE)
     if estimates is not None:
-        estimates = result_of(estimates, "dimension_curves", ESTIMATES, ("method",), argument="estimates")
+        estimates = result_of(estimates, ESTIMATES, ("method",), argument="estimates")
     return datasets, estimates
 
 
@@ -128,8 +128,8 @@ def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
 
 def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
     scale, value = curve_of(curve)
-    curve = result_of(curve, "dimension_curves", (scale, value), (), argument="curves")
-    with Problems("fc.plotting.dimension_curves") as problems:
+    curve = result_of(curve, (scale, value), (), argument="curves")
+    with Problems("fc.plotting") as problems:
         problems.require(curve[scale].ndim == 1, "curves", f"{scale} along one dim", curve[scale].dims)
     dims = curve[scale].dims
     x, y = quantity(curve, scale, dims), quantity(curve, value, dims)
@@ -222,7 +222,7 @@ def dimensions(
     ['default', 'variogram'] | fractal dimension $D$
     """
     names, dims = ("method", "hurst", "fractal_dimension"), ("method",)
-    data = result_of(estimates, "dimensions", names, dims, argument="estimates")
+    data = result_of(estimates, names, dims, argument="estimates")
     methods = words(data["method"])
     value, hurst = quantity(data, "fractal_dimension", dims), table(data, "hurst", dims)
     rows = np.arange(len(methods))[::-1]
@@ -293,7 +293,7 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     wavelength (mm) | Hurst exponent
     """
     dims = ("wavelength",)
-    data = result_of(result, "scaling", ("hurst", "ci_low", "ci_high", *dims, *WINDOW), dims, units)
+    data = result_of(result, ("hurst", "ci_low", "ci_high", *dims, *WINDOW), dims, units)
     wavelength = quantity(data, "wavelength", dims)
     hurst = quantity(data, "hurst", dims, "Hurst exponent")
     panel = LinePanel(_style.axes_or_new(ax), wavelength, hurst, points=0)

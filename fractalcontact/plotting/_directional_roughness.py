@@ -46,10 +46,10 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     """
     from matplotlib.ticker import MaxNLocator
 
-    data = result_of(result, "directional_roughness", tuple(CURVES), ("azimuth",), units)
-    require_dims(data, "directional_roughness", dict.fromkeys(CURVES, "azimuth"))
+    data = result_of(result, tuple(CURVES), ("azimuth",), units)
+    require_dims(data, dict.fromkeys(CURVES, "azimuth"))
     polar: Any = _style.axes_or_new(ax, SIZE, projection="polar")
-    with Problems("fc.plotting.directional_roughness") as problems:
+    with Problems("fc.plotting") as problems:
         problems.require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)
     azimuth = data["azimuth"].values
     order = np.argsort(azimuth % 360.0)

@@ -222,7 +222,8 @@ def draw(
             for word in formats:
                 problems.choice("formats", word, FORMATS)
     if units is not None:
-        require_units([node.to_dataset() for node in tree.subtree], units, "draw")
+        with Problems(WHERE):
+            require_units([node.to_dataset() for node in tree.subtree], units)
         tree = tree.map_over_datasets(lambda dataset: marked(dataset, units))
     with writing(WHERE, "folder", folder):
         return _draw_all(tree, Path(folder), progress, formats)

@@ -60,11 +60,11 @@ def contact_domains(
     >>> len(maps)
     2
     """
-    names = as_dataset(result, "contact_domains").variables
+    names = as_dataset(result).variables
     name = "slip_state" if "slip_state" in names else "state"
-    data = result_of(result, "contact_domains", (name,), PATH, units)
-    require_known_dims(data, "contact_domains", {name: (*PATH, "y", "x")})
-    path, dim = select_path(data, shear, normal_force, panels, "contact_domains")
+    data = result_of(result, (name,), PATH, units)
+    require_known_dims(data, {name: (*PATH, "y", "x")})
+    path, dim = select_path(data, shear, normal_force, panels)
     count, columns = path.sizes[dim], _style.number_of_columns(path.sizes[dim])
     width = _style.WIDTH * columns / _style.COLUMNS
     state = path[name].transpose(dim, "y", "x")
@@ -186,9 +186,9 @@ def surface(
     >>> [each.get_ylabel() for each in ax.figure.axes]
     ['$y$ (mm)', 'height (mm)']
     """
-    plane = _maps.plane_of(surface, "surface", "height", units, "surface")
+    plane = _maps.plane_of(surface, "height", units, "surface")
     if block is not None:
-        with Problems("fc.plotting.surface") as problems:
+        with Problems("fc.plotting") as problems:
             problems.grid("block", block)
     ax = _style.axes_or_new(ax, _style.MAP)
     _maps.draw_values(ax, plane, colours=_style.HEIGHT_MAP, shaded=shaded)
@@ -220,7 +220,7 @@ def field(data: Any, *, title: str | None = None, units: Units | None = None, ax
     >>> print(ax.figure.axes[1].get_ylabel())
     contact pressure (MPa)
     """
-    plane = _maps.plane_of(data, "field", "", units, "data")
+    plane = _maps.plane_of(data, "", units, "data")
     ax = _style.axes_or_new(ax, _style.MAP)
     if plane.name == "label":
         _maps.draw_labels(ax, plane)
@@ -263,8 +263,8 @@ def first_contact(
     >>> print(ax.figure.axes[1].get_ylabel())
     normal force $F$ of first contact (N)
     """
-    data = result_of(result, "first_contact", ("state",), PATH, units)
-    require_known_dims(data, "first_contact", {"state": (*PATH, "y", "x")})
+    data = result_of(result, ("state",), PATH, units)
+    require_known_dims(data, {"state": (*PATH, "y", "x")})
     path = at_shear(data, shear)
     name = load_of(path)
     loads = table(path, name, ("step",)) if name else np.arange(path.sizes["step"], dtype=float)

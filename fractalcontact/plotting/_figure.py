@@ -42,13 +42,15 @@ def figure(function: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(function)
     def wrapper(*arguments: P.args, **options: P.kwargs) -> R:
-        with Problems(f"fc.plotting.{function.__name__}") as problems:
+        where = f"fc.plotting.{function.__name__}"
+        with Problems(where) as problems:
             for name, value in signature.bind(*arguments, **options).arguments.items():
                 if value is not None or signature.parameters[name].default is not None:
                     expected, is_valid = OPTIONS.get(name, LABELLED)
                     shown = value if name in OPTIONS else Words(type(value).__name__)
                     problems.require(is_valid(value), name, expected, shown)
-        return function(*arguments, **options)
+        with Problems(where):  # what is raised in the block names this function
+            return function(*arguments, **options)
 
     if function.__doc__:
         returned = "Axes" if "ax" in signature.parameters else "array of Axes"

@@ -43,8 +43,8 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     >>> print(ax.get_ylabel())
     hydraulic aperture (µm)
     """
-    data = result_of(result, "hydraulic_aperture", ("hydraulic_aperture",), (*PATH, "axis"), units)
-    dims, x, family = path_axis(data, None, "hydraulic_aperture")
+    data = result_of(result, ("hydraulic_aperture",), (*PATH, "axis"), units)
+    dims, x, family = path_axis(data, None)
     aperture = quantity(data, "hydraulic_aperture", ("axis", *dims))
     panel = LinePanel(_style.axes_or_new(ax), x, aperture, family, points=_style.MAX_MARKED_POINTS)
     axes = words(data["axis"]) if "axis" in data.coords else []
@@ -88,15 +88,13 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     >>> print(uplift.get_ylabel())
     uplift (kPa)
     """
-    data = result_of(
-        result, "uplift", ("fluid_pressure", "uplift_profile", "uplift_x", "uplift_y"), (), units
-    )
-    plane = _maps.plane_of(data[["fluid_pressure"]], "uplift", "fluid_pressure")
+    data = result_of(result, ("fluid_pressure", "uplift_profile", "uplift_x", "uplift_y"), (), units)
+    plane = _maps.plane_of(data[["fluid_pressure"]], "fluid_pressure")
     profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
                                               and d not in ("diagram", "x", "y")])  # fmt: skip
     names = ("uplift_profile", "uplift_x", "uplift_y", "diagram")
-    require_dims(data, "uplift", dict.fromkeys(names, "diagram"))
-    with Problems("fc.plotting.uplift") as problems:
+    require_dims(data, dict.fromkeys(names, "diagram"))
+    with Problems("fc.plotting") as problems:
         problems.require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
         diagrams = words(data["diagram"])
         are_known = "linear" in diagrams and set(diagrams) <= set(LINES)

@@ -19,7 +19,6 @@ PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 
 def result_of(
     data: Any,
-    where: str,
     names: Sequence[str],
     dims: Sequence[str],
     units: Units | None = None,
@@ -32,8 +31,6 @@ def result_of(
     Parameters
     ----------
     data : Dataset, DataArray, or node of a DataTree
-    where : str
-        Name of the plotting function, for the message.
     names : sequence of str
         Variables that must be present.
     dims : sequence of str
@@ -48,9 +45,9 @@ def result_of(
     InvalidInput
         A variable is missing, or another path dim is longer than one.
     """
-    dataset = shown_in(as_dataset(data, where, argument), units, where)
-    require_variables(dataset, where, names, argument)
-    with Problems(f"fc.plotting.{where}") as problems:
+    dataset = shown_in(as_dataset(data, argument), units)
+    require_variables(dataset, names, argument)
+    with Problems("fc.plotting") as problems:
         extra = [
             dim
             for dim in dataset.dims
@@ -64,7 +61,7 @@ def result_of(
     return dataset.expand_dims([dim for dim in dims if dim not in dataset.dims])
 
 
-def as_dataset(data: Any, where: str, argument: str = "result") -> xr.Dataset:
+def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
     """Return the valid Dataset of a result, of a tree's node or of a DataArray; (y, x) are its last dims."""
     if isinstance(data, xr.DataTree):
         data = data.to_dataset()
@@ -75,7 +72,7 @@ def as_dataset(data: Any, where: str, argument: str = "result") -> xr.Dataset:
             if is_own
             else data.rename("height" if data.name in (None, "") else data.name).to_dataset()
         )
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
         if problems.require(isinstance(data, xr.Dataset), argument, expected, type(data).__name__):
             problems.result(argument, data)
@@ -87,29 +84,27 @@ def as_dataset(data: Any, where: str, argument: str = "result") -> xr.Dataset:
     return result
 
 
-def require_variables(
-    dataset: xr.Dataset, where: str, names: Sequence[str], argument: str = "result"
-) -> None:
+def require_variables(dataset: xr.Dataset, names: Sequence[str], argument: str = "result") -> None:
     """Raise InvalidInput unless the variables are present."""
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         for name in names:
             problems.require(
                 name in dataset.variables, argument, f"the variable {name!r}", list(dataset.variables)
             )
 
 
-def require_dims(dataset: xr.Dataset, where: str, dims: Mapping[str, str], argument: str = "result") -> None:
+def require_dims(dataset: xr.Dataset, dims: Mapping[str, str], argument: str = "result") -> None:
     """Raise InvalidInput unless each of the variables has its dim."""
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         for name, dim in dims.items():
             if problems.require(name in dataset.variables, argument, f"the variable {name!r}", NONE):
                 own = dataset[name].dims
                 problems.require(dim in own, f"{argument}.{name}", f"the dim {dim}", own)
 
 
-def require_known_dims(dataset: xr.Dataset, where: str, dims: Mapping[str, Sequence[str]]) -> None:
+def require_known_dims(dataset: xr.Dataset, dims: Mapping[str, Sequence[str]]) -> None:
     """Raise InvalidInput if one of the variables has another dim than these."""
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         for name, known in dims.items():
             own = dataset[name].dims
             problems.require(set(own) <= set(known), f"result.{name}", f"dims out of {', '.join(known)}", own)

@@ -53,9 +53,9 @@ def islands(result: Any, *, units: Units | None = None, axes: Panels | None = No
     >>> print(island_map.get_title(), "|", areas.get_xlabel())
     4 islands | island area (mm²)
     """
-    data = result_of(result, "islands", ("label", "area"), SEVERAL, units)
-    require_dims(data, "islands", {"area": "island"})
-    require_known_dims(data, "islands", {"area": ("island", *SEVERAL)})
+    data = result_of(result, ("label", "area"), SEVERAL, units)
+    require_dims(data, {"area": "island"})
+    require_known_dims(data, {"area": ("island", *SEVERAL)})
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.2), width_ratios=(1, 1.15))
     _maps.draw_labels(left, _last_map(data["label"]))
     _draw_areas(right, data)
@@ -139,9 +139,9 @@ def lineage(
     >>> print(left.get_ylabel(), "|", right.get_ylabel())
     number of islands | islands in a step
     """
-    lost = "absorbed" if "absorbed" in as_dataset(result, "lineage").variables else "merges"
-    data = result_of(result, "lineage", ("n_islands", "births", lost), PATH, units)
-    dims, x, family = path_axis(data, against, "lineage")
+    lost = "absorbed" if "absorbed" in as_dataset(result).variables else "merges"
+    data = result_of(result, ("n_islands", "births", lost), PATH, units)
+    dims, x, family = path_axis(data, against)
     shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), sharex=True)
     counts = quantity(data, "n_islands", dims, "number of islands")
     births, losses = quantity(data, "births", dims, "islands in a step"), table(data, lost, dims)
@@ -214,9 +214,9 @@ def alluvial(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     normal force $F$ (N) | cells in contact
     """
-    data = result_of(result, "alluvial", COLUMNS, ("shear",), units)
+    data = result_of(result, COLUMNS, ("shear",), units)
     path = at_shear(data, shear)
-    with Problems("fc.plotting.alluvial") as problems:
+    with Problems("fc.plotting") as problems:
         for name in COLUMNS:
             problems.require(path[name].dims == ("link",), f"result.{name}", "the dim link", path[name].dims)
     if "shear" in path.coords and "link_shear" in path:

@@ -231,15 +231,13 @@ def round_length(length: float) -> float:
     return float(power * max(m for m in (1, 2, 5) if m * power <= length * (1 + 1e-9)))
 
 
-def plane_of(
-    data: Any, where: str, name: str, units: Units | None = None, argument: str = "result"
-) -> xr.DataArray:
+def plane_of(data: Any, name: str, units: Units | None = None, argument: str = "result") -> xr.DataArray:
     """Return the one plane (y, x) in `data`: the variable `name`, or the only one that there is."""
-    dataset = shown_in(as_dataset(data, where, argument), units, where)
+    dataset = shown_in(as_dataset(data, argument), units)
     names = list(dataset.data_vars)
     planes = [each for each in names if {"y", "x"} <= set(dataset[each].dims)] or names[:1]
     variable = name if name in names else planes[0] if planes else ""
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         if problems.require(bool(variable), argument, "a variable with dims (y, x)", NONE):
             is_one = variable == name or len(planes) == 1
             problems.require(is_one, argument, "one variable with dims (y, x)", planes)

@@ -24,19 +24,19 @@ def load_of(data: xr.Dataset) -> str:
     return next((name for name in LOADS if name in data.variables), "")
 
 
-def loads_of(data: xr.Dataset, against: str, where: str, dims: tuple[str, str] = PATH) -> Quantity:
+def loads_of(data: xr.Dataset, against: str, dims: tuple[str, str] = PATH) -> Quantity:
     """Return a variable of every shear and step for the x axis; without one of that name the step."""
     if against not in data.variables:
         steps = np.arange(data.sizes["step"], dtype=float)
         values = np.broadcast_to(steps, [data.sizes[dim] for dim in PATH])
         return Quantity(values if dims == PATH else values.T, PLAIN, "step")
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         own = data[against].dims
         problems.require(set(own) <= set(PATH), "against", "a variable of every step", own)
     return quantity(data, against, dims)
 
 
-def path_axis(data: xr.Dataset, against: str | None, where: str) -> tuple[tuple[str, str], Quantity, Family]:
+def path_axis(data: xr.Dataset, against: str | None) -> tuple[tuple[str, str], Quantity, Family]:
     """Return the dims of curves along a path, the variable they are drawn against, and their family.
 
     Without `against` it is the first load that the result has, or shear where it has a single step.
@@ -46,7 +46,7 @@ def path_axis(data: xr.Dataset, against: str | None, where: str) -> tuple[tuple[
         against = (load_of(data) or "step") if by_step else "shear"
     by_shears = against == "shear"
     dims = ("step", "shear") if by_shears else PATH
-    return dims, loads_of(data, against, where, dims), by_load(data) if by_shears else by_shear(data)
+    return dims, loads_of(data, against, dims), by_load(data) if by_shears else by_shear(data)
 
 
 def by_load(data: xr.Dataset) -> Family:
@@ -105,10 +105,10 @@ def at_shear(data: xr.Dataset, shear: float | None) -> xr.Dataset:
 
 
 def select_path(
-    data: xr.Dataset, shear: float | None, normal_force: float | None, most: int, where: str
+    data: xr.Dataset, shear: float | None, normal_force: float | None, most: int
 ) -> tuple[xr.Dataset, str]:
     """Return at most `most` states along the chosen path, and the dim of that path."""
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         if data.sizes["shear"] > 1 and data.sizes["step"] > 1:
             problems.exactly_one(shear=shear, normal_force=normal_force)
         if normal_force is not None:
@@ -142,16 +142,15 @@ NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 def select_direction(
     data: Any,
     direction: str | float | None,
-    where: str,
     units: Units | None = None,
     argument: str = "result",
 ) -> xr.Dataset:
     """Return the part of a result that belongs to a direction, a word or an azimuth (None: everything)."""
-    dataset = shown_in(as_dataset(data, where, argument), units, where)
+    dataset = shown_in(as_dataset(data, argument), units)
     if direction is None or "direction" not in dataset.coords:
         return dataset
     names = words(dataset["direction"])
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         if isinstance(direction, str):
             problems.choice("direction", direction, names)
             matches = [name == direction for name in names]

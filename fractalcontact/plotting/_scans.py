@@ -47,12 +47,12 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
     >>> fc.plotting.scans(overview)[0].get_xlabel()
     'height Sq (µm)'
     """
-    data = result_of(overview, "scans", (), (SCAN,), units)
+    data = result_of(overview, (), (SCAN,), units)
     columns = {str(name): values for name, values in data.data_vars.items() if values.dims == (SCAN,)}
     names = [name for name, values in columns.items() if values.dtype.kind == "f"]
     names = [name for name in names if not name.endswith(NOT_SHOWN) and np.isfinite(data[name]).any()]
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
-    with Problems("fractalcontact.plotting.scans") as problems:
+    with Problems("fc.plotting") as problems:
         problems.require(bool(names), "overview", "numbers over scan", NONE)
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
     for ax, name in zip(shown, names, strict=False):

@@ -79,13 +79,13 @@ def signature(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     box size (mm) | local dimension
     """
-    data = result_of(result, "signature", ("local_slope",), PATH, units)
+    data = result_of(result, ("local_slope",), PATH, units)
     nulls = [name for name in NULLS if name in data]
     over = next((name for name in ("side", *IN_CELLS) if name in data["local_slope"].dims), "box_size")
-    require_dims(data, "signature", dict.fromkeys(("local_slope", *nulls), over))
+    require_dims(data, dict.fromkeys(("local_slope", *nulls), over))
     for name in nulls[:1]:
         _, dim, constant, sign = NULLS[name]
-        require_variables(data, "signature", [dim])
+        require_variables(data, [dim])
         slope = constant + sign * local_slope(data[dim].values, data[name].values)
         data = data.assign(null_local_slope=(data[name].dims, slope))
     shown = path_panels(axes, data)
@@ -166,15 +166,13 @@ def lacunarity(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     box size (mm) | lacunarity $\Lambda$
     """
-    data = result_of(result, "lacunarity", ("lacunarity",), PATH, units)
-    require_dims(data, "lacunarity", {"lacunarity": "box_size"})
+    data = result_of(result, ("lacunarity",), PATH, units)
+    require_dims(data, {"lacunarity": "box_size"})
     shown = path_panels(axes, data)
     if maps:
         for ax, dim, path, _, text in _chosen_paths(data, shear, normal_force, shown, None):
             name = "shear" if dim == "shear" else _paths.load_of(path)
-            along = _paths.loads_of(
-                path.expand_dims([d for d in PATH if d != dim]), name, "lacunarity", _first(dim)
-            )
+            along = _paths.loads_of(path.expand_dims([d for d in PATH if d != dim]), name, _first(dim))
             places = Quantity(along.values[0], along.scale, along.name)
             colours = quantity(path, "lacunarity", (dim, "box_size"))
             _maps.draw_heat_map(ax, places, sizes_of(path, "box_size"), colours)
@@ -288,9 +286,9 @@ def box_dimension(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     coverage (%) | box dimension $\Delta_\sigma$
     """
-    dataset = as_dataset(result, "box_dimension")
+    dataset = as_dataset(result)
     present = [name for name in DIMENSIONS if name in dataset]
-    data = result_of(dataset, "box_dimension", (present or DIMENSIONS)[:1], PATH, units)
+    data = result_of(dataset, (present or DIMENSIONS)[:1], PATH, units)
     shown, shears = path_panels(axes, data), _paths.by_shear(data)
     first, *_, last = (*shown.values(), *shown.values())
     for dim, ax in shown.items():
@@ -316,7 +314,7 @@ def _draw_dimension(
 ) -> LinePanel:
     """Draw one curve for each of the family with its random null, its points and, if alone, its interval."""
     load = "shear" if dims[1] == "shear" else _paths.load_of(path) or "coverage"
-    x, y = _paths.loads_of(path, load, "box_dimension", dims), quantity(path, name, dims)
+    x, y = _paths.loads_of(path, load, dims), quantity(path, name, dims)
     panel = LinePanel(ax, x, y, family, points=0)
     reliable, described = np.full(y.values.shape, True), "interval wider than 0.5, or none"
     panel.key("contact domain", marker="o")

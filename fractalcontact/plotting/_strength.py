@@ -45,9 +45,9 @@ def strength_envelope(
     shear strength $\tau$ (MPa)
     """
     names, dims = ("shear_strength", "in_range", "criterion"), ("criterion", "nominal_pressure")
-    data = result_of(result, "strength_envelope", names, dims[:1], units)
+    data = result_of(result, names, dims[:1], units)
     for dim in dims:
-        require_dims(data, "strength_envelope", {"shear_strength": dim, "in_range": dim})
+        require_dims(data, {"shear_strength": dim, "in_range": dim})
     data = data.sortby("nominal_pressure")
     pressure = quantity(data, "nominal_pressure", dims[1:])
     every = np.append(pressure.values, data["shear_strength"].values)
@@ -64,7 +64,7 @@ def strength_envelope(
     if not in_range.all():
         panel.key("out of range", **_style.DOTTED)
     if tests is not None:
-        found = result_of(tests, "strength_envelope", (*TESTS, dims[1]), dims[1:], argument="tests")
+        found = result_of(tests, (*TESTS, dims[1]), dims[1:], argument="tests")
         for name, marker in TESTS.items():
             style = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
             label = f"direct shear, {name.partition('_')[0]}"
@@ -129,7 +129,7 @@ def shear_curve(
 
 def _read(result: Any, units: Units | None) -> xr.Dataset:
     names = (*SHOWN, *DIMS)
-    data = result_of(result, "shear_curve", names, ("nominal_pressure",), units)
+    data = result_of(result, names, ("nominal_pressure",), units)
     along = (data["shear_displacement"], data["nominal_pressure"])
     data = data.assign({name: xr.broadcast(data[name], *along)[0] for name in SHOWN})
     return data.transpose("nominal_pressure", ..., missing_dims="ignore")
@@ -171,13 +171,13 @@ def friction(
     >>> print(ax.get_ylabel())
     friction angle (°)
     """
-    selected = _paths.limit_shear(_paths.select_direction(result, None, "friction", units), reach)
+    selected = _paths.limit_shear(_paths.select_direction(result, None, units), reach)
     names = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
     by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
     over = "step" if by_force else "direction"
     if by_force or direction is not None:
-        selected = _paths.select_direction(selected, direction, "friction")
-    data = result_of(selected, "friction", (*names, "shear"), ("shear", over))
+        selected = _paths.select_direction(selected, direction)
+    data = result_of(selected, (*names, "shear"), ("shear", over))
     size = (_style.WIDTH if len(names) > 1 else _style.PANEL[0], 3.1)
     shown = _style.panel_row(axes, len(names), size, sharex=True)
     shear, family = (
@@ -240,7 +240,7 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     """
     names = ("shear_strength", "structure_size", "nominal_pressure", "basic_friction_angle", "shear")
     dims = ("shear", "direction", "structure_size")
-    data = result_of(result, "self_weight", names, dims, units)
+    data = result_of(result, names, dims, units)
     size = quantity(data, "structure_size", ("structure_size",), "size of the structure")
     strength, shears = quantity(data, "shear_strength", dims), _paths.by_shear(data)
     panel = LinePanel(_style.axes_or_new(ax), size, strength, _paths.by_direction(data), points=1)

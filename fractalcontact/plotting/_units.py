@@ -83,18 +83,18 @@ def _are_units(value: Any) -> bool:
 UNITS_EXPECTED = ("a dict of variable and unit", _are_units)
 
 
-def shown_in(data: xr.Dataset, units: Units | None, where: str) -> xr.Dataset:
+def shown_in(data: xr.Dataset, units: Units | None) -> xr.Dataset:
     """Return a result whose variables have the units that a figure is to show them in as an attribute."""
     if units is None:
         return data
-    require_units([data], units, where)
+    require_units([data], units)
     return marked(data, units)
 
 
-def require_units(datasets: Iterable[xr.Dataset], units: Units, where: str) -> None:
+def require_units(datasets: Iterable[xr.Dataset], units: Units) -> None:
     """Raise InvalidInput unless each unit is one of a variable of the datasets."""
     variables = {str(name): dataset[name] for dataset in datasets for name in dataset.variables}
-    with Problems(f"fc.plotting.{where}") as problems:
+    with Problems("fc.plotting") as problems:
         for name, unit in units.items():
             place = f"units[{name!r}]"
             if problems.require(name in variables, place, f"one of {', '.join(sorted(variables))}", name):
