@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning
-from fractalcontact.base.grid import Grid, contact_edges
+from fractalcontact.base.grid import EXCESS_PER_EDGE, Grid, contact_edges
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
 from fractalcontact.base.schema import CONTACT, OPEN, STEEP, STOP_REASONS, YIELDED
@@ -64,7 +64,6 @@ __all__ = [
 PRESSURE_CLASSES = 50  # of a distribution, from 0 to the greatest pressure: enough for a curve of a plot
 # left an error of the stiffness below 1e-5 on rough surfaces of 256 x 256 nodes, .1 one of 5e-4
 PUNCH_TOLERANCE = 1e-2
-PERIMETER = 0.118114160  # (pi - 1 + ln 2)/24, Yastrebov, Anciaux and Molinari (2017)
 # of the superposition from which the full method starts; 1e-4 took 4 % more transforms
 START_TOLERANCE = 1e-2
 
@@ -189,7 +188,7 @@ def _scalars(step: Step, grid: Grid) -> dict[str, Any]:
         "nominal_pressure": step.force / grid.nominal_area,
         "contact_area": cells * grid.cell_area,
         "contact_fraction": cells / contact.size,
-        "corrected_contact_fraction": (cells - PERIMETER * edges) / contact.size,
+        "corrected_contact_fraction": (cells - EXCESS_PER_EDGE * edges) / contact.size,
         "mean_gap": step.mean_gap,
         "elastic_energy": step.elastic_energy,
         "plastic_work": step.plastic_work,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import contact_edges
+from fractalcontact.base.grid import EXCESS_PER_EDGE, contact_edges
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
@@ -17,8 +17,6 @@ from fractalcontact.domains._hausdorff_content import SQUARE, shifted_contents
 from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import ROUNDING, fit_line, interval_notes
 
-# share of a cell by which each side on the boundary makes the area too large (Yastrebov et al. 2017)
-EXCESS_PER_SIDE = (np.pi - 1.0 + np.log(2.0)) / 24.0
 SOURCE = (
     "Borri-Brunetto, Carpinteri and Chiaia, Int. J. Fracture 95:221 (1999); Ciavarella et al., Proc. R. Soc. "
     "A 456:387 (2000); Yastrebov, Anciaux and Molinari, Tribology Int. 114:161 (2017) (correction)"
@@ -132,7 +130,7 @@ def _contact_fractions(planes: Planes) -> tuple[Array, Array]:
     """Return the share of cells in contact, as counted and corrected for its boundary."""
     cells = float(np.prod(planes.grid.shape))
     sides = contact_edges(planes.cells, planes.grid.periodic).sum(-1)
-    return planes.occupied / cells, (planes.occupied - EXCESS_PER_SIDE * sides) / cells
+    return planes.occupied / cells, (planes.occupied - EXCESS_PER_EDGE * sides) / cells
 
 
 def stationary_exponents(stacks: Sequence[Planes]) -> Array:

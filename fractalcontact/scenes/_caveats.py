@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.grid import EXCESS_PER_EDGE
 from fractalcontact.base.references import scene_of
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of
@@ -20,7 +21,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 ISOLATED = 0.05  # of the area: less is lost in the pressure beside it
 MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
-PERIMETER_TO_CELLS = 0.118114160  # of the corrected contact area, see `contact.press`
 TILTED = 0.5  # of the mean square height that the mean plane carries: more, and a flat touches one edge
 SPIKED_DIMENSION, SPIKED_JRC, SPIKED_LIFT = 0.01, 0.5, 0.1  # changes by spikes that are worth a sentence:
 # half of the usual interval of D, a fortieth of the scale of JRC, a tenth of the opening at first touch
@@ -155,7 +155,7 @@ def _cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
         masks = np.asarray(planes.values).reshape(-1, *planes.shape[-2:]) > 0
         medians = np.array([_median_cells(mask) for mask in masks])
         return fraction.copy(data=medians.reshape(fraction.shape))
-    edges = (fraction - pressed["corrected_contact_fraction"]) / (PERIMETER_TO_CELLS * fraction)
+    edges = (fraction - pressed["corrected_contact_fraction"]) / (EXCESS_PER_EDGE * fraction)
     return (4.0 / edges.where(edges > 0)) ** 2
 
 
