@@ -190,9 +190,9 @@ def has_blocks(value: Any) -> bool:
 
 
 def loaded_bytes(arguments: Mapping[str, Any]) -> float:
-    """Return the bytes of the dask arrays among the arguments, once they are loaded."""
-    given = (arguments[name] for name in PLANES if name in arguments)
-    return sum(8.0 * math.prod(getattr(value, "shape", ())) for value in given if has_blocks(value))
+    """Return the bytes of the dask arrays among the arguments, once they are loaded: masks are bytes."""
+    given = [arguments[name] for name in PLANES if has_blocks(arguments.get(name))]
+    return float(sum((8 if value.dtype.kind == "f" else 1) * math.prod(value.shape) for value in given))
 
 
 def plane_in(arguments: Mapping[str, Any]) -> Plane | None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -12,6 +14,7 @@ import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.memory import require_memory
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.validation import Problems, word_tuple
@@ -19,11 +22,13 @@ from fractalcontact.dimensions._curve import fit
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._methods import DEFAULT, METHODS, SYNONYMS
-from fractalcontact.dimensions._records import Estimate
+from fractalcontact.dimensions._records import Estimate, joined
 from fractalcontact.dimensions._surface_input import (
+    Scales,
     Surface,
     check_scales,
     check_surface,
+    is_lazy,
     read_scales,
     read_surfaces,
 )
@@ -50,7 +55,8 @@ _NAMES = (
     *("fractal_dimension", "fractal_dimension_low", "fractal_dimension_high"),
     *("topothesy", "run_time", "method", "increment_lag"),
 )
-IN_BLOCKS = ("increments", "spectrum", "variogram")  # methods that read dask arrays block by block
+IN_BLOCKS = ("increments", "variogram", DEFAULT)  # methods that read dask arrays block by block
+ALL_HEIGHTS = 120.0  # bytes for each height of the others
 
 
 def _check(problems: Problems) -> None:
@@ -78,7 +84,7 @@ def _check(problems: Problems) -> None:
     title="Hurst exponent and fractal dimension of a surface",
     check=_check,
     in_blocks=True,
-    memory=120.0,  # of the likelihood, 88 to 156 as measured; other methods take less
+    memory=ALL_HEIGHTS,  # of the likelihood, 88 to 156 as measured; other methods take less
 )
 def estimate(
     surface: xr.DataArray,
@@ -125,8 +131,10 @@ def estimate(
     Notes
     -----
     Free edges: fractional Brownian heights. Periodic: a power-law spectrum between cut-offs. The interval
-    is widened, with a note, where the surface fits neither. Theory: page `theory_dimensions`; measured
-    coverage and limits: page `estimator_accuracy`. Select a method with ``sel({"method": "spectrum"})``.
+    is widened, with a note, where the surface fits neither. Of dask arrays "likelihood" reads at most the
+    middle 4096 x 4096 points, "increments" and "variogram" read all in blocks; the others load all, or
+    refuse to. Theory: page `theory_dimensions`; measured coverage and limits: page `estimator_accuracy`.
+    Select a method with ``sel({"method": "spectrum"})``.
 
     References
     ----------
@@ -142,11 +150,15 @@ def estimate(
     """
     surfaces, window = read_surfaces(surface), read_scales(scales)
     names = ("default",) if methods is None else word_tuple(methods)
-    if set(map(_row, names)) - set(IN_BLOCKS):
-        announce_loading("fractalcontact.dimensions.estimate", {"surface": surface})
+    if is_lazy(surface) and set(map(_row, names)) - set(IN_BLOCKS):
+        where, size = "fractalcontact.dimensions.estimate", math.prod(surfaces[0].shape)
+        require_memory(
+            where, ALL_HEIGHTS * size, f"{size} heights at once; in blocks: {', '.join(IN_BLOCKS)}"
+        )
+        announce_loading(where, {"surface": surface})
     estimates, times = [], np.zeros((len(surfaces), len(names)))
     for row, single in enumerate(surfaces):
-        by_likelihood = cache(lambda single=single: likelihood(single, window, noise, psf))
+        by_likelihood = cache(lambda single=single: _by_likelihood(single, window, noise, psf))
         for column, name in enumerate(names):
             start = time.perf_counter()
             if _row(name) == DEFAULT:
@@ -160,6 +172,16 @@ def estimate(
             estimates.append(record.limited())
             times[row, column] = time.perf_counter() - start
     return _dataset(surface, surfaces, names, estimates, times)
+
+
+def _by_likelihood(surface: Surface, window: Scales, noise: float | None, psf: float | None) -> Estimate:
+    """Return the estimate of a surface, of one in blocks that of its middle."""
+    middle = surface.middle()
+    record = likelihood(middle, window, noise, psf)
+    if middle is surface:
+        return record
+    text = f"of the middle {' x '.join(map(str, middle.grid.shape))} points"
+    return replace(record, note=joined(text, record.note))
 
 
 def _row(name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -14,7 +15,15 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, PERIODIC, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
-from fractalcontact.dimensions._surface_input import Scales, Surface, between, check_surface
+from fractalcontact.dimensions._surface_input import (
+    LARGEST,
+    Scales,
+    Surface,
+    between,
+    check_surface,
+    is_lazy,
+    read_surfaces,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
 _ROUNDING = (
@@ -56,7 +65,8 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
         periodic; there only the mean is.
     tile : int, optional
         Average the spectra of square tiles of this edge in points, overlapping by half (Welch 1967): for
-        surfaces that do not fit in memory, or for a smoother curve. Default: the whole surface.
+        surfaces that do not fit in memory, or for a smoother curve. Default: the whole surface, of a dask
+        array of more than 4096 x 4096 points tiles of 4096.
 
     Returns
     -------
@@ -91,6 +101,9 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     0.7
     """
     taper = "none" if window is None else window
+    shape = read_surfaces(surface)[0].grid.shape
+    if tile is None and is_lazy(surface) and math.prod(shape) > LARGEST**2:
+        tile = min(LARGEST ** (3 - len(shape)), *shape)
     return curve_dataset(
         surface,
         lambda single: ring_curve(single, taper, tile),
@@ -98,7 +111,7 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
         _NAMES[2 if "y" in surface.dims else 1],
         count="mode_count",
         slope=_local_slope,
-    )
+    ).assign_attrs(parameters={"tile": tile})
 
 
 def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) -> Curve:
@@ -150,11 +163,11 @@ def _tiles(surface: Surface, tile: int | None) -> Iterator[Array]:
     edge_y = min(tile, ny)
     for j in range(0, ny - edge_y + 1, max(edge_y // 2, 1)):
         if surface.is_lazy and surface.axes == 2:
-            strip = np.asarray(surface.source.isel(y=slice(j, j + edge_y)).values, dtype=np.float64)
+            strip = surface.source.isel(y=slice(j, j + edge_y)).values
         else:
             strip = surface.raw[j : j + edge_y]
         for i in range(0, nx - tile + 1, tile // 2):
-            yield strip[:, i : i + tile]
+            yield np.asarray(strip[:, i : i + tile], dtype=np.float64)
 
 
 def _local_slope(curve: Curve) -> Array:

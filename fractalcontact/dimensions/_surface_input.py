@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +22,7 @@ ROUNDING = 1e-12  # of the range of heights
 DECADES = 250  # powers of ten of a metre: heights are scaled before they are used
 SMALLEST_UNIT, LARGEST_UNIT = 2.0**-450, 2.0**450  # m: ranges whose second and fourth powers are finite
 MIDDLE = 256  # points to each side of the middle that are inspected for interpolation
+LARGEST = 4096  # edge of what is transformed at a time of a surface that is not in memory, 134 MB
 SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
 
 
@@ -131,6 +133,18 @@ class Surface:
     def plane_spacing(self) -> tuple[float, float]:
         """(dy/dx, 1), also for a profile."""
         return self.spacing[0] / self.spacing[1], 1.0
+
+    def middle(self) -> Surface:
+        """Return the middle of a surface in blocks that is too large for a transform; any other as it is."""
+        if not self.is_lazy or math.prod(self.grid.shape) <= LARGEST**2:
+            return self
+        edge = LARGEST ** (3 - self.axes)
+        cuts = {
+            dim: slice(max(0, (n - edge) // 2), (n + edge) // 2)
+            for dim, n in zip(_core_dims(self.source), self.grid.shape, strict=True)
+        }
+        part = self.source.isel(cuts).load()
+        return Surface(part, read_grid(part, _core_dims(part)))
 
     @property
     def is_complete(self) -> bool:

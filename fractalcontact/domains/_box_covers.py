@@ -15,6 +15,8 @@ import numpy as np
 from fractalcontact.base.jit import kernel
 from fractalcontact.domains._masks import Array, Planes, parallel_map
 
+FOLD = 1 << 13  # positions of boxes that are kept apart: with fewer, loops are too short to be fast
+ADDED = 1 << 22  # sums that are added up at a time: all those of a large plane take gigabytes
 COVERS = ("minimum", "mean", "aligned")
 ROW = np.array(
     [[0, 1, 0, 1, 0]]
@@ -62,8 +64,7 @@ def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
 
     def fewest(task: tuple[Array, int]) -> tuple[int, int]:
         cells, size = task
-        count, area = _counts_by_offset(cells, size, *bands[size], wrap_x=planes.grid.periodic[1])
-        return int(count.min()), int(area.min())
+        return _fewest_boxes(cells, size, *bands[size], wrap_x=planes.grid.periodic[1])
 
     tasks = [(cells, size) for cells in planes.cells for size in bands]
     values = np.array(parallel_map(fewest, tasks, planes.plane_size), np.int64).reshape(
@@ -72,10 +73,10 @@ def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
     return Curve(sizes, values[..., 0], values[..., 1].astype(float))
 
 
-def _counts_by_offset(
+def _fewest_boxes(
     cells: Array, size: int, row_bands: Array, column_bands: Array, *, wrap_x: bool
-) -> tuple[Array, Array]:
-    """Return the boxes that meet the set, and their area in cells, for every offset of the grid (y, x).
+) -> tuple[int, int]:
+    """Return the fewest boxes that meet the set, and their least area in cells, over all offsets of the grid.
 
     The bands are those of `_bands` for the rows and for the columns.
     """
@@ -83,26 +84,35 @@ def _counts_by_offset(
     # ascending, so that the column sums of a band follow from those of the band before it
     row_bands = row_bands[np.lexsort((row_bands[:, 1], row_bands[:, 0]))]
     is_full = column_bands[:, 1] - column_bands[:, 0] == size
-    count, area = np.zeros((2, offsets, size), np.int64)
+    count, area = np.zeros((offsets, size), np.int32), np.zeros((offsets, size), np.int64)
     summed_rows = np.zeros((2, 2), np.int64)
     columns = np.zeros((3, nx), np.int32)
     prefix = np.zeros((2, nx + 1 + (2 * size if wrap_x else 0)), np.int32)
-    met, lost = np.zeros((2, offsets, int(is_full.sum())), np.int32)
+    positions = int(is_full.sum())
+    fold = size * max(1, -(-min(positions, FOLD) // size))  # of a whole number of boxes
+    met, lost = np.zeros((2, offsets, fold), np.int32)
     count_boxes_in_bands(
-        cells, size, row_bands, column_bands[~is_full], summed_rows, columns, prefix, met, lost, count, area
+        cells,
+        size,
+        row_bands,
+        column_bands[~is_full],
+        positions,
+        summed_rows,
+        columns,
+        prefix,
+        met,
+        lost,
+        count,
+        area,
     )
-    full = _sum_by_offset(met, size)
-    count += full
-    area += size * (size * full - _sum_by_offset(lost, size))
-    return count, area
-
-
-def _sum_by_offset(values: Array, size: int) -> Array:
-    """Add up the positions of boxes that belong to the same offset in x."""
-    positions = values.shape[1]
-    padded = np.zeros((len(values), positions + -positions % size), values.dtype)
-    padded[:, :positions] = values
-    return np.asarray(padded.reshape(len(values), -1, size).sum(1, dtype=np.int64))
+    fewest, least = [], []
+    step = max(1, ADDED // fold)
+    for start in range(0, offsets, step):
+        rows = slice(start, start + step)
+        full, cut = (v[rows].reshape(-1, fold // size, size).sum(1, dtype=np.int64) for v in (met, lost))
+        fewest.append(int((count[rows] + full).min()))
+        least.append(int((area[rows] + size * (size * full - cut)).min()))
+    return min(fewest), min(least)
 
 
 def _bands(n: int, size: int, wraps: bool) -> Array:
@@ -153,7 +163,8 @@ def _positions_that_meet(cells: Array, largest: int, periodic: Sequence[bool]) -
     ahead = [(0, largest if wraps and n > 1 else 0) for n, wraps in zip(cells.shape, periodic, strict=True)]
     distance = np.full(nx + ahead[1][1] + 1, largest + 1, np.int32)
     histogram = np.zeros(largest + 2, np.int64)
-    nearest_ahead(np.pad(cells, ahead, mode="wrap"), ny, nx, distance, histogram)
+    continued = np.pad(cells, ahead, mode="wrap") if np.any(ahead) else cells
+    nearest_ahead(continued, ny, nx, distance, histogram)
     every = np.cumsum(histogram)[: largest + 1]  # with the boxes that hang over the far edges
     folded = every.copy()
     free = {axis: _from_edges(cells, axis, largest) for axis in (0, 1) if not periodic[axis]}
@@ -246,6 +257,7 @@ def count_boxes_in_bands(
     size: int,
     rows: Array,
     cut: Array,
+    positions: int,
     summed_rows: Array,
     columns: Array,
     prefix: Array,
@@ -257,8 +269,9 @@ def count_boxes_in_bands(
     """Add the boxes that meet the set in all bands of rows; `mask` is uint8 (0 or 1), shape (ny, nx).
 
     `rows` lists the bands of rows by their start, then by their stop, `cut` the bands of columns that are
-    cut by the edge (see `_bands`). `met` and `lost` (size, positions) get for each full band of columns the
-    boxes met, and the rows that those of them lose that count by their part inside; `count` and `area`
+    cut by the edge (see `_bands`). `met` and `lost` (size, multiple of size) get for the full bands of
+    columns, one at each of `positions`, by their position modulo that multiple, the boxes met, and the rows
+    that those of them lose that count by their part inside; `count` and `area`
     (size, size) the boxes cut in x and their area in cells. All sums are integers, so that no result depends
     on their order.
 
@@ -291,12 +304,15 @@ def count_boxes_in_bands(
                 prefix[w, j + 1] = total
             for j in range(nx + 1, prefix.shape[1]):
                 prefix[w, j] = total + prefix[w, j - nx]
-        if missing > 0:
-            for j in range(met.shape[1]):
-                inside = prefix[0, j + ahead] > prefix[0, j] and prefix[1, j + ahead] > prefix[1, j]
-                lost[offset, j] += missing * inside
-        for j in range(met.shape[1]):
-            met[offset, j] += prefix[0, j + ahead] > prefix[0, j]
+        for low in range(0, positions, met.shape[1]):
+            inner, outer = prefix[0, low:], prefix[1, low:]
+            width = min(met.shape[1], positions - low)
+            if missing > 0:
+                for j in range(width):
+                    inside = inner[j + ahead] > inner[j] and outer[j + ahead] > outer[j]
+                    lost[offset, j] += missing * inside
+            for j in range(width):
+                met[offset, j] += inner[j + ahead] > inner[j]
         for c in range(cut.shape[0]):
             left, right, column = cut[c, 0], cut[c, 1], cut[c, 4]
             here = prefix[0, right] - prefix[0, left]

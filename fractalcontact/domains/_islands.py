@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.memory import Plane
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains._connected_components import (
@@ -34,7 +35,16 @@ def _check(problems: Problems) -> None:
     check_connected(problems, profiles=True)
 
 
-@public_result(title="Islands of a set", references=SOURCE, achieved_error="exact", check=_check)
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of a call: with its map, labelled at once; otherwise in bands."""
+    has_shape = set(word_tuple(arguments.get("include") or ())) & set(SHAPE_COLUMNS)
+    has_map = "label" in word_tuple(arguments.get("keep", "label"))
+    return (25.0 if has_shape else 6.0 if has_map else 3.0) * plane.cells
+
+
+@public_result(
+    title="Islands of a set", references=SOURCE, achieved_error="exact", check=_check, memory=_memory
+)
 def islands(
     mask: xr.DataArray,
     *,

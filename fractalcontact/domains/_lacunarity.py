@@ -5,7 +5,7 @@ Below it, the moments of the mass in a gliding box, by blocks of positions, and 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,8 @@ from scipy.special import stdtrit
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel, sum_kernel
-from fractalcontact.base.results import public_result
+from fractalcontact.base.memory import Plane
+from fractalcontact.base.results import ARRAYS, public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
 from fractalcontact.domains._masks import Array, Planes
@@ -37,7 +38,16 @@ def _check(problems: Problems) -> None:
     _masks.check_box_sizes(problems, min(_masks.mask_sides(support)))
 
 
-@public_result(title="Lacunarity", references=SOURCE, achieved_error="exact to rounding", check=_check)
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of a call: boxes glide over a set row by row."""
+    is_field = getattr(arguments.get("mask"), "dtype", np.dtype(bool)).kind == "f"
+    glides = arguments.get("boxes") != "fixed" and not is_field
+    return (2.0 if glides else ARRAYS) * plane.cells
+
+
+@public_result(
+    title="Lacunarity", references=SOURCE, achieved_error="exact to rounding", check=_check, memory=_memory
+)
 def lacunarity(
     mask: xr.DataArray,
     box_sizes: Any = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -11,14 +11,15 @@ import xarray as xr
 from fractalcontact.base import spectra
 from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import scaled_slopes, shifted
+from fractalcontact.base.polynomial import RANK, scaled_slopes, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, labelled_rows
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
-
+SLAB = 1 << 22  # points of a dask array at a time: its differences take ten times their 34 MB
 HEIGHT_STATISTICS = (
     "mean_height",
     "rms_height",
@@ -33,7 +34,10 @@ HEIGHT_STATISTICS = (
 
 def _check(problems: Problems) -> None:
     surface = problems.given.surface
-    check_planes(problems, smallest=3)
+    if has_blocks(surface):
+        problems.surface("surface", finite=False, smallest=3, leading=True, profile=True)
+    else:
+        check_planes(problems, smallest=3)
     if isinstance(surface, xr.DataArray):
         check_leading(surface, _result_names(len(core_dims(surface))), problems)
 
@@ -43,6 +47,7 @@ def _check(problems: Problems) -> None:
     references=NAYAK,
     achieved_error="exact to rounding, for the points as they are",
     check=_check,
+    in_blocks=True,
     memory=116.0,
 )
 def describe(surface: xr.DataArray) -> xr.Dataset:
@@ -81,6 +86,7 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     A complete periodic surface is differentiated by its Fourier modes: its mean square slope is the sum of
     q^2 C. Any other uses differences of neighbours, which reduce the shortest wavelengths a little. The
     developed area is that of triangles between neighbours. ISO 25178-2 levels and filters first; use `level`.
+    A dask array is read twice, one row of blocks at a time, and is not differentiated by modes.
 
     References
     ----------
@@ -97,11 +103,16 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     7.071e-07 m, 0.0694
     """
     grid = read_grid(surface, core_dims(surface))
-    planes = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
-    result = labelled_rows(surface, [_statistics(plane, grid.spacing, grid.periodic) for plane in planes])
-    by_modes = all(grid.periodic) and not np.isnan(planes).any()
+    if has_blocks(surface):
+        places = np.ndindex(*surface.shape[: surface.ndim - len(grid.shape)])
+        rows = [_statistics_in_blocks(surface[place], grid.spacing) for place in places]
+    else:
+        planes = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
+        rows = [_statistics(plane, grid.spacing, grid.periodic) for plane in planes]
+    result = labelled_rows(surface, rows)
+    by_modes = all(grid.periodic) and not has_blocks(surface) and not result["missing_points"].any()
     result.attrs["derivatives"] = "modes" if by_modes else "differences"
-    _explain_missing(result, planes)
+    _explain_missing(result, math.prod(grid.shape))
     return result
 
 
@@ -110,13 +121,13 @@ def _result_names(axes: int) -> list[str]:
     return [*HEIGHT_STATISTICS, "missing_points", *_gradient_names(axes), "run_time"]
 
 
-def _explain_missing(result: xr.Dataset, planes: Array) -> None:
+def _explain_missing(result: xr.Dataset, size: int) -> None:
     """Set the attribute `reason` of every statistic that is NaN."""
     variables = {name: result.variables[name] for name in result.data_vars}
     undefined = [name for name, variable in variables.items() if np.isnan(variable.values).any()]
     if not undefined:
         return
-    empty = bool(np.isnan(planes).all(axis=tuple(range(1, planes.ndim))).any())
+    empty = bool((variables["missing_points"].values == size).any())
     flat = bool((variables["peak_to_valley"].values == 0).any())
     for name in undefined:
         reason = "no point was observed" if empty else "too few neighbouring points were observed"
@@ -132,28 +143,125 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     """
     complete = not np.isnan(heights.min())
     if not complete and np.isnan(heights).all():
-        result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {"missing_points": heights.size}
-        return result | dict.fromkeys(_gradient_names(heights.ndim), math.nan)
+        return _nothing(heights.shape)
     values, reference, scale = shifted(heights)
-    result = _heights(values if complete else values[~np.isnan(values)], reference, scale)
-    result["missing_points"] = 0 if complete else int(np.count_nonzero(np.isnan(values)))
-    unit = math.ldexp(1.0, math.frexp(max(spacing))[1])
-    steps = [step / unit for step in spacing]
-    ratio = scale / unit
-    squares, laplacian_square, excess = _neighbours(values, steps, periodic, ratio)
+    known = values if complete else values[~np.isnan(values)]
+    mean, ends = float(known.mean()), (float(known.min()), float(known.max()))
+    result = _heights(_powers(known, mean), known.size, mean, ends, reference, scale)
+    result["missing_points"] = values.size - known.size
+    unit, steps = _scaled_steps(spacing)
+    neighbours = _means(_neighbours(values, steps, periodic, scale / unit))
+    by_modes = None
     if all(periodic) and complete:
         psd, _ = spectra.periodogram(values, steps)
         moments = spectra.spectral_moments(psd, values.shape, steps)
-        along = spectra.directional_slopes(psd, values.shape, steps)
-    else:
-        height = (result["rms_height"] / scale) ** 2
-        moments = spectra.Moments(height, sum(squares), laplacian_square, values.ndim)
+        by_modes = moments, spectra.directional_slopes(psd, values.shape, steps)
+    slopes = scaled_slopes(values, spacing)
+    return result | _gradients(neighbours, slopes, result["rms_height"], scale, unit, by_modes)
+
+
+def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> dict[str, float]:
+    """Return the statistics of a plane or a profile of dask, from one row of blocks at a time."""
+    axes, ny, nx = surface.ndim, (1, *surface.shape)[-2], surface.shape[-1]
+    low, high, origin, total, size, infinite = math.inf, -math.inf, math.nan, 0.0, 0, 0
+    for block, _ in _row_blocks(surface):
+        known = block[~np.isnan(block)]
+        infinite += int(np.count_nonzero(np.isinf(known)))
+        low, high = min(low, float(known.min(initial=low))), max(high, float(known.max(initial=high)))
+        origin = float(known[0]) if known.size and math.isnan(origin) else origin  # for digits of the mean
+        total, size = total + float((known - origin).sum()), size + known.size
+    with Problems("fractalcontact.surfaces.describe") as problems:
+        expected = "finite heights, or NaN where missing"
+        problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
+    if not size:
+        return _nothing(surface.shape)
+    scale = math.ldexp(1.0, math.frexp(high - low)[1]) if high > low else 1.0
+    mean, (unit, steps) = (total / size + (origin - low)) / scale, _scaled_steps(spacing)
+    x, half = np.linspace(-1.0, 1.0, nx), 0.5 * max(ny - 1, 1)
+    powers, gram, right, sums = np.zeros(4), np.zeros((3, 3)), np.zeros(3), np.zeros((axes + 2, 2))
+    before = np.empty((0, nx))
+    for block, start in _row_blocks(surface):
+        block -= low
+        block /= scale
+        for first in range(0, len(block), rows := max(3, SLAB // nx)):
+            values = block[first : first + rows]
+            is_known = ~np.isnan(values)
+            powers += _powers(values[is_known], mean)
+            # a slope along y needs the row before, the Laplacian two: each pair and triple counts once
+            joined = np.concatenate([before, values])
+            if axes == 1:
+                sums += _neighbours(values[0], steps, (False,), scale / unit)
+            else:
+                own, with_one, with_two = (
+                    _neighbours(joined[max(0, len(before) - k) :], steps, (False, False), scale / unit)
+                    for k in range(3)
+                )
+                sums += with_one[0], own[1], with_two[2], with_one[3]
+            before = joined[-2:].copy()
+            # least-squares plane of 1, x and y
+            filled = np.where(is_known, values, 0.0)
+            y = (start + first + np.arange(len(values))) / half - 1.0
+            ones, ax, axx = is_known.sum(axis=1), is_known @ x, is_known @ (x * x)
+            gram += [
+                [ones.sum(), ax.sum(), y @ ones],
+                [ax.sum(), axx.sum(), y @ ax],
+                [y @ ones, y @ ax, (y * y) @ ones],
+            ]
+            right += filled.sum(), (filled @ x).sum(), y @ filled.sum(axis=1)
+    result = _heights(powers, size, mean, (0.0, (high - low) / scale), low, scale)
+    result["missing_points"] = surface.size - size
+    gram, right = gram[: axes + 1, : axes + 1], right[: axes + 1]
+    is_plane = np.linalg.cond(gram) * RANK < 1.0
+    weights = np.linalg.solve(gram, right) if is_plane else np.full(axes + 1, math.nan)
+    halves = [0.5 * (n - 1) * step for n, step in zip(surface.shape, spacing, strict=True)]
+    slopes = tuple(float(w) / each for w, each in zip(weights[:0:-1], halves, strict=True))
+    neighbours = _means([(float(total), int(count)) for total, count in sums])
+    return result | _gradients(neighbours, slopes, result["rms_height"], scale, unit)
+
+
+def _row_blocks(surface: xr.DataArray) -> Iterator[tuple[Array, int]]:
+    """Yield the heights of each row of blocks, (rows, nx), and the number of its first row."""
+    if surface.ndim == 1:
+        yield np.array(surface.values, dtype=np.float64)[None], 0
+        return
+    lengths = surface.chunks[0]  # type: ignore[index]
+    for stop, rows in zip(np.cumsum(lengths), lengths, strict=True):
+        yield np.array(surface[stop - rows : stop].values, dtype=np.float64), int(stop - rows)
+
+
+def _scaled_steps(spacing: Sequence[float]) -> tuple[float, list[float]]:
+    """Return the unit of length, a power of two, and the spacing in it."""
+    unit = math.ldexp(1.0, math.frexp(max(spacing))[1])
+    return unit, [step / unit for step in spacing]
+
+
+def _nothing(shape: Sequence[int]) -> dict[str, float]:
+    """Return the statistics of a surface of which nothing was observed."""
+    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {"missing_points": math.prod(shape)}
+    return result | dict.fromkeys(_gradient_names(len(shape)), math.nan)
+
+
+def _gradients(
+    neighbours: Sequence[float],
+    mean: tuple[float, ...],
+    rms_height: float,
+    scale: float,
+    unit: float,
+    by_modes: tuple[spectra.Moments, tuple[float, ...]] | None = None,
+) -> dict[str, float]:
+    """Return the statistics of slopes, curvature and area; `mean` are the mean slopes."""
+    *squares, laplacian_square, excess = neighbours
+    ratio, result = scale / unit, dict[str, float]()
+    if by_modes is None:
+        height = (rms_height / scale) ** 2
+        moments = spectra.Moments(height, sum(squares), laplacian_square, len(squares))
         along = tuple(math.sqrt(square) for square in squares)
-    mean = scaled_slopes(values, spacing)
+    else:
+        moments, along = by_modes
     result["rms_slope"] = moments.rms_slope * ratio
     result["rms_curvature"] = moments.rms_curvature * ratio / unit
     result["nayak_parameter"] = moments.nayak
-    for name, rms, slope in zip(("y", "x")[2 - heights.ndim :], along, mean, strict=True):
+    for name, rms, slope in zip(("y", "x")[2 - len(squares) :], along, mean, strict=True):
         result[f"rms_slope_{name}"] = rms * ratio
         result[f"mean_slope_{name}"] = scale * slope
     result["developed_area_ratio"] = 1.0 + excess
@@ -168,30 +276,37 @@ def _gradient_names(axes: int) -> list[str]:
     ]
 
 
-def _heights(values: Array, reference: float, scale: float) -> dict[str, float]:
-    """Return the statistics of the distribution of heights reference + scale * values."""
-    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan)
-    mean = float(values.mean())
-    highest, lowest = float(values.max()), float(values.min())
+def _powers(values: Array, mean: float) -> Array:
+    """Return the sums of |d|, d^2, d^3 and d^4 of the deviations d from the mean."""
     deviation = values.ravel() - mean
     squares = deviation * deviation  # higher powers as products: numpy takes ten times as long for values**3
-    variance = float(squares.mean())
+    return np.array([np.abs(deviation).sum(), squares.sum(), squares @ deviation, squares @ squares])
+
+
+def _heights(
+    powers: Array, size: int, mean: float, ends: tuple[float, float], reference: float, scale: float
+) -> dict[str, float]:
+    """Return the statistics of the distribution of heights reference + scale * values, from `_powers`."""
+    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan)
+    (lowest, highest), (absolute, square, cube, fourth) = ends, (float(power) / size for power in powers)
+    variance = square
     result["mean_height"] = reference + scale * mean
     result["rms_height"] = scale * math.sqrt(variance)
-    result["mean_absolute_height"] = scale * float(np.abs(deviation).mean())
+    result["mean_absolute_height"] = scale * absolute
     result["peak_height"] = scale * (highest - mean)
     result["valley_depth"] = scale * (mean - lowest)
     result["peak_to_valley"] = scale * (highest - lowest)
     if highest > lowest:
-        result["skewness"] = float(squares @ deviation) / deviation.size / variance**1.5
-        result["kurtosis"] = float(squares @ squares) / deviation.size / variance**2
+        result["skewness"] = cube / variance**1.5
+        result["kurtosis"] = fourth / variance**2
     return result
 
 
 def _neighbours(
     values: Array, steps: Sequence[float], periodic: Sequence[bool], ratio: float
-) -> tuple[list[float], float, float]:
-    """Return means over neighbours: squares of the slopes and of the Laplacian, and excess of area over plan.
+) -> list[tuple[float, int]]:
+    """Return sums over neighbours, and their numbers: squares of the slope along each axis and of the
+    Laplacian, and excess of area over plan.
 
     They are in scaled heights and steps; `ratio` is the unit of height over that of length.
     """
@@ -200,23 +315,28 @@ def _neighbours(
     onward = np.pad(plane, [(0, wrap) for wrap in wraps], mode="wrap")  # each point and the next
     slopes = [np.diff(onward, axis=axis) / step for axis, step in enumerate(spacing)]
     own = slopes[0][:, : plane.shape[1]], slopes[1][: plane.shape[0]]
-    squares = [_observed_mean(slope**2) for slope in own[2 - values.ndim :]]
+    squares = [_observed_sum(slope**2) for slope in own[2 - values.ndim :]]
     around = np.pad(plane, [(wrap, wrap) for wrap in wraps], mode="wrap")
     bends = [np.diff(around, 2, axis=axis) / step**2 for axis, step in enumerate(spacing)]
     laplacian = bends[1] if values.ndim == 1 else bends[0][:, 1:-1] + bends[1][1:-1]
-    laplacian_square = _observed_mean(laplacian**2)
+    laplacian_square = _observed_sum(laplacian**2)
     along, across = ((ratio * slope) ** 2 for slope in slopes)
     if values.ndim == 1:
-        return squares, laplacian_square, _observed_mean(_excess(across))
+        return [*squares, laplacian_square, _observed_sum(_excess(across))]
     # of a cell, the mean over its corners, at each of which two of its edges meet
     corners = (_excess(x + y) for x in (across[:-1], across[1:]) for y in (along[:, :-1], along[:, 1:]))
-    return squares, laplacian_square, _observed_mean(0.25 * sum(corners, np.zeros(1)))
+    return [*squares, laplacian_square, _observed_sum(0.25 * sum(corners, np.zeros(1)))]
 
 
-def _observed_mean(values: Array) -> float:
-    """Return the mean of the observed values; NaN without any."""
+def _observed_sum(values: Array) -> tuple[float, int]:
+    """Return the sum of the observed values, and their number."""
     observed = values[np.isfinite(values)]
-    return float(observed.mean()) if observed.size else math.nan
+    return float(observed.sum()), observed.size
+
+
+def _means(sums: Sequence[tuple[float, int]]) -> list[float]:
+    """Return the means of sums with their numbers; NaN without any."""
+    return [total / count if count else math.nan for total, count in sums]
 
 
 def _excess(square: Array) -> Array:

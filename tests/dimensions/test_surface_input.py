@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base.errors import LoadedWarning
+from fractalcontact.base.errors import LoadedWarning, TooLittleMemory
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +41,35 @@ def test_functions_that_load_a_dask_array_say_so(rough):
     pytest.importorskip("dask")
     lazy = rough.chunk({"y": 7})
     size = f"{rough.nbytes / 1e6:.3g} MB"
-    with pytest.warns(LoadedWarning, match=f"describe: the dask arrays of `surface` .* {size}"):
-        fc.surfaces.describe(lazy)
+    with pytest.warns(LoadedWarning, match=f"texture: the dask arrays of `surface` .* {size}"):
+        fc.surfaces.texture(lazy)
     with pytest.warns(LoadedWarning, match="estimate"):
-        fc.dimensions.estimate(lazy)
-    fc.dimensions.estimate(lazy, ["increments", "spectrum"])  # a warning is an error here
+        fc.dimensions.estimate(lazy, "cube_counts")
+    fc.dimensions.estimate(lazy, ["increments", "variogram", "default"])  # a warning is an error here
     assert fc.surfaces.from_array(lazy.data, 1e-4).chunks is not None
+
+
+def test_of_large_dask_arrays_a_part_is_transformed_at_a_time(rough, monkeypatch):
+    pytest.importorskip("dask")
+    lazy, edge = rough.chunk({"y": 7}), 32
+    for module in ("_surface_input", "_spectrum"):
+        monkeypatch.setattr(f"fractalcontact.dimensions.{module}.LARGEST", edge)
+    assert min(rough.shape) > edge
+    cuts = [slice((n - edge) // 2, (n + edge) // 2) for n in rough.shape]
+    part, whole = fc.dimensions.estimate(rough[cuts[0], cuts[1]]), fc.dimensions.estimate(lazy)
+    for name in ("hurst", "ci_low", "ci_high"):
+        np.testing.assert_array_equal(whole[name], part[name])
+    assert f"of the middle {edge} x {edge} points" in str(whole.note.values)
+    curves = fc.dimensions.spectrum(lazy), fc.dimensions.spectrum(rough, tile=edge)
+    np.testing.assert_allclose(curves[0].power_spectral_density, curves[1].power_spectral_density, rtol=1e-9)
+    assert f'"tile": {edge}' in curves[0].attrs["provenance"]
+
+
+def test_a_method_that_needs_all_heights_is_refused_for_a_huge_dask_array():
+    da = pytest.importorskip("dask.array")
+    huge = fc.surfaces.from_array(da.zeros((1 << 18, 1 << 18), chunks=4096), 1e-6)
+    with pytest.raises(TooLittleMemory, match=r"in blocks: increments, variogram, likelihood"):
+        fc.dimensions.estimate(huge, "spectrum")
 
 
 def test_invalid_arguments_of_curves(rough):

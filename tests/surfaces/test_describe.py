@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -245,3 +246,27 @@ def test_large_surface_against_whole_arrays(periodic, gaps):
         assert found.rms_slope_x.item() == pytest.approx(np.sqrt(np.nanmean(along_x)), rel=1e-12)
         assert found.rms_slope_y.item() == pytest.approx(np.sqrt(np.nanmean(along_y)), rel=1e-12)
         assert found.rms_curvature.item() == pytest.approx(np.sqrt(np.nanmean(laplacian**2)) / 2, rel=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(70, 90), (3, 45, 50), (37,)])
+@pytest.mark.parametrize("gap", [slice(0), slice(3, 9)])
+def test_a_dask_array_has_the_statistics_of_one_in_memory(shape, gap):
+    pytest.importorskip("dask")
+    heights = np.random.default_rng(0).standard_normal(shape).cumsum(-1) * 1e-6 + 5.0
+    heights[..., gap] = np.nan
+    spacing = 1e-5 if len(shape) == 1 else (1e-5, 2e-5)
+    planes = heights.reshape(-1, *shape[-2:]) if len(shape) > 1 else [heights]
+    surface = xr.concat([fc.surfaces.from_array(plane, spacing) for plane in planes], "scan")
+    whole = fc.surfaces.describe(surface)
+    blocks = fc.surfaces.describe(surface.chunk({"x": 30, **({"y": 20} if len(shape) > 1 else {})}))
+    for name in set(whole.data_vars) - {"run_time"}:
+        np.testing.assert_allclose(blocks[name], whole[name], rtol=1e-9, atol=1e-12, err_msg=name)
+
+
+def test_infinite_heights_of_a_dask_array_are_refused():
+    da = pytest.importorskip("dask.array")
+    heights = np.zeros((20, 20))
+    heights[3, 4] = np.inf
+    lazy = fc.surfaces.from_array(da.from_array(heights, chunks=8), 1e-5)
+    with pytest.raises(InvalidInput, match="finite heights, or NaN where missing, got 1 infinite"):
+        fc.surfaces.describe(lazy)
