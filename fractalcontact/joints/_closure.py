@@ -35,8 +35,8 @@ UNDETERMINED = (
 def _check(problems: Problems) -> None:
     check_sliding(problems)
     check_pressing(problems)
-    problems.choice("bulk", among=BULK)
     problems.choices("keep", among=CONTACT_MAPS, optional=True)
+    problems.choice("bulk", among=BULK)
 
 
 @public_result(title="closure of a sheared crack", check=_check, memory=PRESSING_BYTES)

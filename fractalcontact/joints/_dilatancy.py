@@ -43,8 +43,8 @@ def _check(problems: Problems) -> None:
     problems.require(one_of, "pressed", "nothing beside `normal_stiffness`")
     problems.number("normal_stiffness", above=0, optional=True)
     check_pressing(problems)
-    problems.choice("bulk", among=BULK)
     problems.choices("keep", among=CONTACT_MAPS, optional=True)
+    problems.choice("bulk", among=BULK)
 
 
 def _check_defaults(problems: Problems) -> None:
