@@ -238,8 +238,9 @@ def test_limit_of_detection_is_that_of_theory(shape, hurst, wavelength):
     assert shares[1] >= 0.8
 
 
-def test_tenth_of_an_increment_is_found_named_and_excluded():
-    for seed in range(1):
+@pytest.mark.parametrize("seeds", [1, pytest.param(3, marks=pytest.mark.slow)])
+def test_tenth_of_an_increment_is_found_named_and_excluded(seeds):
+    for seed in range(seeds):
         surface = brownian((256, 256), 0.5, 300 + seed)
         azimuth = 20.0 + 50.0 * seed
         marked = surface + marks(surface, azimuth, 5.3, 0.1)
@@ -266,10 +267,11 @@ def test_faint_multiples_and_crossed_marks():
     assert apart < 0.5
 
 
-def test_sawtooth_is_named_with_its_multiples():
+@pytest.mark.parametrize("seeds", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_sawtooth_is_named_with_its_multiples(seeds):
     """Once thirty waves without a relation, or none."""
     errors = []
-    for seed in range(2):
+    for seed in range(seeds):
         surface = brownian((128, 128), 0.5, 500 + seed)
         angle = np.radians(20.0 + 40.0 * seed)
         along = (surface.x * np.cos(angle) + surface.y * np.sin(angle)) / (13.7 * SPACING)
@@ -332,9 +334,10 @@ def random_ridges(seed):
     return brownian((128, 128), 0.5, seed) + 3.0 * STEP * ridges
 
 
-def test_ridges_are_no_waves():
+@pytest.mark.parametrize("seeds", [4, pytest.param(9, marks=pytest.mark.slow)])
+def test_ridges_are_no_waves(seeds):
     """Once waves in 33 of 40 surfaces with drawn ridges, and in 6 of 40 with ridges at random."""
-    for surface in (*map(drawn_ridges, range(4)), *map(random_ridges, range(4))):
+    for surface in (*map(drawn_ridges, range(seeds)), *map(random_ridges, range(seeds))):
         assert fc.dimensions.waves(surface).sizes["wave"] == 0
 
 

@@ -11,9 +11,10 @@ from scipy import ndimage
 import fractalcontact as fc
 
 
-def test_null_counts_match_exact_fractions():
+@pytest.mark.parametrize("sets", [100, pytest.param(300, marks=pytest.mark.slow)])
+def test_null_counts_match_exact_fractions(sets):
     rng = np.random.default_rng(11)
-    for _ in range(100):
+    for _ in range(sets):
         ny, nx = (int(n) for n in rng.integers(2, 64, 2))
         observed, size = ny * nx, int(rng.integers(1, min(ny, nx, 8) + 1))
         cells, region = int(rng.integers(0, observed + 1)), size**2
