@@ -179,6 +179,10 @@ def check_measure(problems: Problems, *, profiles: bool = False) -> Any:
     support = support_of(mask)
     if support is not None:
         check_mask(problems, support, profiles=profiles)
+    else:
+        problems.boolean("periodic", optional=True)
+        if problems.given.valid is not None:
+            _check_valid(problems, problems.given.valid, None)
     return support
 
 
