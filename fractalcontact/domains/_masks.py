@@ -180,7 +180,7 @@ def check_measure(problems: Problems, *, profiles: bool = False) -> Any:
     if support is not None:
         check_mask(problems, support, profiles=profiles)
     else:
-        problems.boolean("periodic", optional=True)
+        problems.boolean("periodic", getattr(problems.given, "periodic", None), optional=True)
         if problems.given.valid is not None:
             _check_valid(problems, problems.given.valid, None)
     return support
