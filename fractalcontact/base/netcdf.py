@@ -16,9 +16,9 @@ import os
 import platform
 import shutil
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -81,16 +81,25 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
             problems.require(name.endswith(".nc"), "path", "a name that ends in '.nc'", name)
         is_labelled = isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree))
         problems.require(is_labelled, "result", "a DataArray, Dataset or DataTree", type(result).__name__)
+    return save_with(result, Path(path), ())
+
+
+def save_with(
+    result: xr.DataArray | xr.Dataset | xr.DataTree, target: Path, more: Iterable[tuple[str, xr.Dataset]]
+) -> Path:
+    """Write a result, and further groups as they come, with one of those in memory at a time; see `save`."""
+    where = SAVE
     groups = _as_file(result)
     with Problems(where) as problems:
         for name, dataset in groups.items():
             _check_words(problems, name, dataset)
-    target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         clear_partial(target.parent)
         with written_whole(target) as temporary:
-            _write(groups, temporary)
+            _write(groups, temporary, "w")
+            for name, dataset in more:
+                _write({name: dataset}, temporary, "a")
             append_checksum(temporary)
     except (TypeError, ValueError, AttributeError) as error:  # the last of netCDF4, for attributes
         expected = "names, values and attributes that a NetCDF file can hold"
@@ -226,8 +235,8 @@ class _WaitingArrays:
         self.arrays.append((source, target))
 
 
-def _write(groups: Mapping[str, xr.Dataset], path: Path) -> None:
-    """Write the groups of a file: all names, dims and attributes first, then the arrays.
+def _write(groups: Mapping[str, xr.Dataset], path: Path, mode: Literal["w", "a"]) -> None:
+    """Write groups to a file, new for the mode "w": all names, dims and attributes first, then the arrays.
 
     Blocks of dask arrays are computed and written one by one, each under the lock.
     """
@@ -237,14 +246,14 @@ def _write(groups: Mapping[str, xr.Dataset], path: Path) -> None:
 
     waiting = _WaitingArrays()
     with NETCDF_LOCK:
-        file = netCDF4.Dataset(path, "w", format="NETCDF4")
+        file = netCDF4.Dataset(path, mode, format="NETCDF4")
     try:
         for name, dataset in groups.items():
             for variable in dataset.variables.values():
                 if variable.chunks is None:
                     variable.load()  # a lazy array of another file needs the lock of xarray
             with NETCDF_LOCK:
-                store = NetCDF4DataStore(file, group=name, mode="w", lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
+                store = NetCDF4DataStore(file, group=name, mode=mode, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
                 dataset.dump_to_store(store, writer=waiting)
         writer = ArrayWriter()  # type: ignore[no-untyped-call]
         for source, target in waiting.arrays:

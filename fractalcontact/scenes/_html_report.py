@@ -29,7 +29,7 @@ from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes import _rows
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, page_of
+from fractalcontact.scenes._overview import OVERVIEW, SCANS, page_of, pictured
 from fractalcontact.scenes._result_tables import SCAN, spread, table_of
 from fractalcontact.scenes._results_folder import REPORT, is_report
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
@@ -133,7 +133,7 @@ def report(
         if pictures is None:
             from fractalcontact import plotting  # only here: `run` has drawn them
 
-            pictures = plotting.draw(tree, folder)
+            pictures = plotting.draw(pictured(tree), folder)
         return write_report(tree, target, pictures, summary_of(tree))
 
 

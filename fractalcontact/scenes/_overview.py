@@ -45,6 +45,13 @@ _ROWS = Rows(
 )  # fmt: skip
 
 
+def pictured(tree: xr.DataTree) -> xr.DataTree:
+    """Return the groups of a study that figures show: of many scans the overview alone."""
+    if OVERVIEW not in tree.children:
+        return tree
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
+
+
 def pooled(overview: xr.Dataset) -> xr.Dataset:
     """Return the mean of every number over the scans, its interval, and the scatter between scans."""
     means: dict[str, tuple[tuple[()], float, dict[str, str]]] = {}

@@ -28,7 +28,7 @@ from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import write_report
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, pooled
+from fractalcontact.scenes._overview import OVERVIEW, SCANS, pictured, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import ScanStudies
@@ -99,7 +99,7 @@ def run(
         Groups named after the subpackages. The root's `provenance` holds the scene, and the run time,
         achieved error and origin of every stage. Of many scans: a row for each in the group `overview`, their
         numbers along `scan`, in the root the means with their intervals; the maps of each in
-        `out/scans/NAME/result.nc`, without `out` in the group `scans/NAME`.
+        the group `scans/NAME` of the file. Without `out` that group holds the whole study of the scan.
 
     Warns
     -----
@@ -170,13 +170,13 @@ def _run_scans(
         tree = _assemble(scene, groups, studies.seconds, [], pooled(groups[OVERVIEW]))
         _note_run_time(tree, start)
         tree.attrs["caveats"] = "none"
-        netcdf.save(tree, folder / RESULT)
+        netcdf.save_with(tree, folder / RESULT, studies.maps())
         with _beside_the_result():
             frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
             with netcdf.written_whole(folder / _results_folder.CSV) as temporary:
                 frame.to_csv(temporary, index=False)
-            overview = xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
-            figures = _draw(overview, folder, progress) if scene.want.figures and studies.numbers else []
+            is_drawn = scene.want.figures and studies.numbers
+            figures = _draw(pictured(tree), folder, progress) if is_drawn else []
             _results_folder.remove_old_figures(folder, figures)
             whole = summary_of(tree)
             write_report(tree, folder / _results_folder.REPORT, figures, whole)

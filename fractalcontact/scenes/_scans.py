@@ -137,6 +137,15 @@ class ScanStudies:
                 total[stage] = total.get(stage, 0.0) + float(facts["run_time"])
         return total
 
+    def maps(self) -> Iterator[tuple[str, xr.Dataset]]:
+        """Yield the maps of every scan, by their group; one scan is in memory at a time."""
+        for name in self.numbers:
+            for node in open_result(self.folder / SCANS / folder_of(name) / RESULT).subtree:
+                data = node.to_dataset(inherit=False)
+                maps = [key for key, each in data.data_vars.items() if set(each.dims) >= MAP_DIMS]
+                if maps:
+                    yield f"/{SCANS}/{folder_of(name)}{node.path}", data[maps]
+
     def groups(self) -> Numbers:
         """Return the numbers of all scans along `scan`, and the overview."""
         groups = {OVERVIEW: self._overview()}

@@ -85,11 +85,22 @@ def test_a_damaged_scan_is_a_row_with_its_reason(study):
     assert 'href="scans/damaged.nc' not in page
 
 
-def test_maps_are_stored_once(study):
+def test_file_has_the_maps_of_each_scan(study):
     _, out, result = study
-    assert all("y" not in node.dims for node in fc.open(out / "result.nc").subtree)
-    assert fc.open(out / "scans" / "a.nc" / "result.nc")["surfaces/height"].shape == (32, 32)
-    same(fc.open(out / "result.nc"), result)
+    assert all("y" not in node.dims for node in result.subtree)
+    whole = fc.open(out / "result.nc")
+    alone = fc.open(out / "scans" / "a.nc" / "result.nc")["surfaces/height"]
+    assert alone.shape == (32, 32)
+    xr.testing.assert_identical(whole["scans/a.nc/surfaces/height"], alone)
+    same(whole.filter(lambda node: not node.path.startswith("/scans")), result)
+
+
+def test_report_of_the_file_has_the_overview_and_links(study):
+    """Once an error: the figures of one scan were wanted of all."""
+    _, out, _ = study
+    page = fc.scenes.report(out / "result.nc", out / "again.html").read_text(encoding="utf-8")
+    assert 'href="scans/a.nc/report.html"' in page
+    assert "data:image/png" in page
 
 
 def test_stage_that_fails_leaves_the_other_results_of_its_scan(tmp_path):
