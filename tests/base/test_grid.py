@@ -81,10 +81,10 @@ def test_periodic_axes_may_be_declared_free_but_not_the_reverse():
     surface = plane()
     for choice, axes in ((False, (False, False)), (None, (True, True)), (True, (True, True))):
         with Problems("test") as problems:
-            assert problems.periodic("periodic", choice, grid(surface))
+            assert problems.periodic(grid(surface), choice)
         assert periodic_axes(choice, grid(surface)) == axes
     with pytest.raises(InvalidInput, match="periodic"), Problems("test") as problems:
-        assert not problems.periodic("periodic", True, grid(surface.isel(x=slice(0, 4))))
+        assert not problems.periodic(grid(surface.isel(x=slice(0, 4))), True)
 
 
 def test_edges_of_a_small_mask():

@@ -70,13 +70,14 @@ def test_profile_is_not_changed_by_a_tilt(tilt):
     np.testing.assert_allclose(result.hurst, scaling(heights).hurst, atol=1e-6)
 
 
-@pytest.mark.parametrize("members", [30, pytest.param(100, marks=pytest.mark.slow)])
-def test_coverage_of_octaves(members):
+# of 30 intervals of 95 %, 25 or fewer hold in one test of 300
+@pytest.mark.parametrize(("members", "least"), [(30, 0.84), pytest.param(100, 0.88, marks=pytest.mark.slow)])
+def test_coverage_of_octaves(members, least):
     rng = np.random.default_rng(5)
     surfaces = fc.surfaces.fbm((64, 64), SPACING, hurst=0.4, rms_increment=1e-6, members=members, rng=rng)
     result = fc.dimensions.scaling(surfaces)
     held = (result.ci_low < 0.4) & (result.ci_high > 0.4)
-    assert (held[:, :3].mean("member") > 0.88).all()
+    assert (held[:, :3].mean("member") > least).all()
     assert result.in_window[:, :3].all("wavelength").mean() > 0.95
 
 
