@@ -70,7 +70,7 @@ def test_profile_is_not_changed_by_a_tilt(tilt):
     np.testing.assert_allclose(result.hurst, scaling(heights).hurst, atol=1e-6)
 
 
-# of 30 intervals of 95 %, 25 or fewer hold in one test of 300
+# of 30 intervals of 95 %, fewer than 26 hold in one case of 60
 @pytest.mark.parametrize(("members", "least"), [(30, 0.84), pytest.param(100, 0.88, marks=pytest.mark.slow)])
 def test_coverage_of_octaves(members, least):
     rng = np.random.default_rng(5)
