@@ -22,7 +22,7 @@ from fractalcontact.dimensions._curve import fit
 from fractalcontact.dimensions._increments import increments
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._methods import DEFAULT, METHODS, SYNONYMS
-from fractalcontact.dimensions._records import Estimate, joined
+from fractalcontact.dimensions._records import Estimate, joined, undefined
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,
@@ -56,6 +56,8 @@ _NAMES = (
     *("topothesy", "run_time", "method", "increment_lag"),
 )
 IN_BLOCKS = ("increments", "variogram", DEFAULT)  # methods that read dask arrays block by block
+# observed, by axes: intervals of profiles of 8 points and of maps of 3 x 9 were checked to hold (see tests)
+FEWEST_POINTS = {1: 8, 2: 25}
 ALL_HEIGHTS = 120.0  # bytes for each height of the others
 
 
@@ -69,9 +71,7 @@ def _check(problems: Problems) -> None:
     is_number = given.psf is not None and problems.number("psf", at_least=0.0)
     is_valid = check_surface(
         problems,
-        smallest=max((METHODS[name].smallest for name in names), default=4),
         gaps=all(METHODS[name].gaps for name in names),
-        points=True,
         reserved=_NAMES,
     )
     if is_valid and is_number:
@@ -126,7 +126,7 @@ def estimate(
     Raises
     ------
     InvalidInput
-        Names, scales or axes are wrong, a surface is too small or entirely NaN.
+        Names, scales or axes are wrong, or a surface is entirely NaN.
 
     Notes
     -----
@@ -161,7 +161,9 @@ def estimate(
         by_likelihood = cache(lambda single=single: _by_likelihood(single, window, noise, psf))
         for column, name in enumerate(names):
             start = time.perf_counter()
-            if _row(name) == DEFAULT:
+            if reason := _too_few_points(single):
+                record = undefined(reason)
+            elif _row(name) == DEFAULT:
                 record = by_likelihood()  # "default" and "likelihood" share it
             elif name == "increments":
                 record = increments(single, window, noise)
@@ -182,6 +184,14 @@ def _by_likelihood(surface: Surface, window: Scales, noise: float | None, psf: f
         return record
     text = f"of the middle {' x '.join(map(str, middle.grid.shape))} points"
     return replace(record, note=joined(text, record.note))
+
+
+def _too_few_points(surface: Surface) -> str:
+    """Return why a surface has too few points for an estimate; "" if it has enough."""
+    if surface.is_lazy:
+        return ""
+    observed, least = int(np.count_nonzero(np.isfinite(surface.raw))), FEWEST_POINTS[surface.axes]
+    return f"{observed} observed points, at least {least} are needed" if observed < least else ""
 
 
 def _row(name: str) -> str:

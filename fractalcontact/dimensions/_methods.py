@@ -62,8 +62,6 @@ class Method:
         it is not known. Without it there is no interval.
     gaps : bool
         Whether points may be missing.
-    smallest : int
-        Smallest number of points along an axis.
     ignores_plane : bool
         Whether the curve does not change when a plane is added.
     natural_scale : bool
@@ -78,7 +76,6 @@ class Method:
     expected: str = ""
     covariance: str = ""
     gaps: bool = True
-    smallest: int = 4
     ignores_plane: bool = False
     natural_scale: bool = False
 
@@ -144,7 +141,6 @@ METHODS = {
         windows=(Window(8, 1 / 8, points=128), Window(4, 1 / 2)),
         expected="_roughness_length.expected_roughness",
         covariance="_roughness_length.roughness_covariance",
-        smallest=5,
         ignores_plane=True,
     ),
     "variation": Method(

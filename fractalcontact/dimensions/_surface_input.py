@@ -259,7 +259,6 @@ def check_surface(
     gaps: bool = True,
     profile: bool = True,
     squares: bool = False,
-    points: bool = False,
     reserved: Collection[str] = (),
 ) -> bool:
     """Check the argument `surface`; `read_surfaces` then splits it.
@@ -275,8 +274,6 @@ def check_surface(
         Allow NaN.
     squares : bool
         The squares of the heights in m must be finite numbers.
-    points : bool
-        Require enough observed points for an estimate: 25, or 8 of a profile.
     reserved : collection of str
         Names of the result, which no leading dim may have.
     """
@@ -289,12 +286,8 @@ def check_surface(
         return len(problems.messages) == before
     axes = len(_core_dims(surface))
     _check_heights(problems, surface.values, axes, gaps)
-    if len(problems.messages) == before:
-        stack = np.asarray(surface.values).reshape(-1, int(np.prod(surface.shape[-axes:])))
-        if points:
-            _check_number_of_points(problems, stack, 8 if axes == 1 else 25)
-        if squares:
-            _check_squares(problems, stack)
+    if len(problems.messages) == before and squares:
+        _check_squares(problems, np.asarray(surface.values).reshape(-1, int(np.prod(surface.shape[-axes:]))))
     return len(problems.messages) == before
 
 
@@ -351,15 +344,6 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
         problems.finite("surface", heights, remedy="see fractalcontact.surfaces.fill")
     elif not np.isfinite(heights).reshape(-1, core).any(axis=1).all():
         problems.add("surface", "observed heights", "nothing but NaN")
-
-
-def _check_number_of_points(problems: Problems, stack: Array, smallest: int) -> None:
-    size = stack.shape[1]
-    if size >= smallest and np.isfinite(_distinct(stack).min()):
-        return
-    counts = np.count_nonzero(np.isfinite(stack), axis=1)
-    if counts.min() < smallest:
-        problems.add("surface", f"at least {smallest} observed points", int(counts[counts < smallest][0]))
 
 
 def _distinct(values: Array) -> Array:

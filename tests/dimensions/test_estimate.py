@@ -296,6 +296,25 @@ def test_spike_and_rounded_heights():
     assert float(estimate_one(steps, noise=5e-5 / np.sqrt(12.0)).hurst) == pytest.approx(0.7, abs=0.15)
 
 
+@pytest.mark.parametrize("shape", [(3, 3), (3, 9), (40, 3), (5, 5), (3,), (8,)])
+def test_small_surfaces_have_an_estimate_or_the_reason(shape):
+    names = list(fc.dimensions.methods())
+    face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.5, rms_increment=1e-6, rng=9)
+    small = face[: shape[0], : shape[1]] if len(shape) == 2 else face[5, : shape[0]]
+    result = estimate(small, names)
+    assert all(result.reason.values[np.isnan(result.ci_low.values)])
+    assert int(np.prod(shape)) >= 8 or (result.reason == "3 observed points, at least 8 are needed").all()
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_intervals_of_small_surfaces_hold_the_exponent(hurst):
+    """A strip of 3 x 40 points and a profile of 8."""
+    faces = [fc.surfaces.fbm((64, 64), 1e-4, hurst=hurst, rms_increment=1e-6, rng=n) for n in range(30)]
+    for parts in ([face[:3, :40] for face in faces], [face[5, :8] for face in faces]):
+        results = [estimate_one(part, "increments") for part in parts]
+        assert sum(bool(each.ci_low <= hurst <= each.ci_high) for each in results) >= 26
+
+
 def test_invalid_arguments(rough):
     with pytest.raises(ValueError, match=r"methods: .*'defalt'") as caught:
         estimate(rough, ["defalt"], scales=(2.0, 1.0), noise="yes")
@@ -305,8 +324,6 @@ def test_invalid_arguments(rough):
         "nothing but NaN": lambda: estimate(rough * np.nan),
         "infinite": lambda: estimate(rough.where(rough > 0, np.inf)),
         "uniform spacing": lambda: estimate(rough.assign_coords(x=rough.x**2)),
-        "at least 4 points": lambda: estimate(surface_of(np.eye(3))),
-        "at least 25 observed points": lambda: estimate(surface_of(np.eye(4))),
         "see fractalcontact.surfaces.fill": lambda: estimate(with_gaps(rough), "spectrum"),
         "a DataArray of heights": lambda: estimate(rough.values),
         "'m'": lambda: estimate(rough.assign_attrs(units="kg")),
