@@ -243,9 +243,16 @@ def _combs(found: Sequence[Wave], shape: tuple[int, ...]) -> list[tuple[Array, d
     while left:
         best: dict[int, Wave] = {}
         cycles = np.array([wave.cycles for wave in left])
-        for divisor in range(1, _MULTIPLES + 1):
+        divisors = np.arange(1, _MULTIPLES + 1)
+        multiples = np.arange(1, 2 * _MULTIPLES)[:, None, None] * cycles[0]
+        apart = _unfolded(cycles, multiples / divisors[:, None, None, None], shape)[1]
+        most = np.count_nonzero((apart < _SAME).any(axis=1), axis=1)  # of waves that may be members
+        for divisor in divisors:
+            least = max(len(best), 1 + (divisor > _DIVISORS))
+            if most[divisor - 1] <= least:
+                continue
             members = _members(left, cycles[0] / divisor, 2 * _MULTIPLES, shape)
-            if len(members) > max(len(best), 1 + (divisor > _DIVISORS)):
+            if len(members) > least:
                 best = members
         best = best or {1: left[0]}
         if len(best) > _FEW:
@@ -285,7 +292,7 @@ def _base(members: dict[int, Wave], shape: tuple[int, ...]) -> Array:
 def _unfolded(waves: Array, cycles: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
     """Return the cycles of waves before sampling, the nearest to some, and how many modes they are apart."""
     both = [waves + np.rint(cycles - waves), np.rint(cycles + waves) - waves]
-    apart = [np.abs((each - cycles) * shape).max(axis=-1) for each in both]
+    apart = [np.maximum(*np.moveaxis(np.abs((each - cycles) * shape), -1, 0)) for each in both]
     return np.where((apart[0] <= apart[1])[..., None], *both), np.minimum(*apart)
 
 
@@ -298,21 +305,23 @@ def _of_combs(surface: Surface, found: Sequence[Wave], white: WhiteSurface) -> l
             continue
         level = level or white.level()
         missed = 0
-        for multiple in range(1, _MOST_MULTIPLES):
-            cycles = (base * multiple + 0.5) % 1.0 - 0.5
-            is_long = float(np.hypot(*(cycles * shape))) < LONGEST[surface.axes]
-            if multiple in members or missed > _MISSED or is_long:
-                continue
-            if (
-                _unfolded(np.array([wave.cycles for wave in [*found, *new]]), cycles, shape)[1].min()
-                < _BESIDE
-            ):
+        known = np.array([wave.cycles for wave in [*found, *new]])
+        multiples = np.setdiff1d(np.arange(1, _MOST_MULTIPLES), list(members))
+        places = (multiples[:, None] * base + 0.5) % 1.0 - 0.5
+        is_free = _unfolded(known, places[:, None], shape)[1].min(axis=1) >= _BESIDE
+        is_free &= np.hypot(*(places * shape).T) >= LONGEST[surface.axes]
+        own: list[Array] = []
+        for cycles in places[is_free]:
+            if missed > _MISSED:
+                break
+            if own and _unfolded(np.array(own), cycles, shape)[1].min() < _BESIDE:
                 continue
             cosine, sine, ratio = white.wave(cycles)
             ratio /= level.at(cycles)
             missed += 1
             if ratio > _ON_COMB:
                 missed = 0
+                own.append(cycles)
                 new.append(_named(surface, cycles, (cosine, sine), float(np.exp(-ratio)), on_comb=True))
     return new
 
