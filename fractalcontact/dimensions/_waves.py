@@ -247,7 +247,7 @@ def _combs(found: Sequence[Wave], shape: tuple[int, ...]) -> list[tuple[Array, d
         multiples = np.arange(1, 2 * _MULTIPLES)[:, None, None] * cycles[0]
         apart = _unfolded(cycles, multiples / divisors[:, None, None, None], shape)[1]
         most = np.count_nonzero((apart < _SAME).any(axis=1), axis=1)  # of waves that may be members
-        for divisor in divisors:
+        for divisor in range(1, _MULTIPLES + 1):
             least = max(len(best), 1 + (divisor > _DIVISORS))
             if most[divisor - 1] <= least:
                 continue
