@@ -99,7 +99,7 @@ def plane_coords(
     coords = {}
     for dim, n, step, wraps in zip(dims, shape, spacing, periodic, strict=True):
         attributes = {"units": "m"} | ({"period": float(n * step)} if wraps else {})
-        coords[dim] = xr.Variable((dim,), centres(int(n), float(step)), attributes, fastpath=True)
+        coords[dim] = xr.Variable((dim,), centres(int(n), float(step)), attributes)
     return coords
 
 

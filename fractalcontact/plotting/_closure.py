@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure
-from fractalcontact.plotting._inputs import nearest, quantity, result_of, table
+from fractalcontact.plotting._inputs import nearest, result_of, table
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, by_shear
 from fractalcontact.plotting._style import Axes
@@ -72,23 +72,21 @@ def closure_laws(
     if laws is not None:
         return _draw_laws(closure, laws, key, log, units, ax)
     data = result_of(closure, ("closure", "normal_force"), PATH, units, "closure")
-    total, force = quantity(data, "closure", PATH, "closure"), quantity(data, "normal_force", PATH)
-    last = force.values.shape[1] - 1
     with Problems("fc.plotting") as problems:
+        last = data.sizes["step"] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
-    panel = LinePanel(_style.axes_or_new(ax), total, force, by_shear(data))
-    inner = total.values
-    if "interface_closure" in data:
-        inner = table(data, "interface_closure", PATH)
-        panel.curves("interface closure", inner, force.values, key=r"interface, $w_\mathrm{int}$")
-        panel.curves("total closure", total.values, force.values, key="total, $w$", **TOTAL_LINE)
+    panel = LinePanel.of(ax, data, "closure", "normal_force", PATH, by_shear(data), x_name="closure")
+    inner = "interface_closure" if "interface_closure" in data else "closure"
+    if inner == "interface_closure":
+        panel.curves("interface closure", x=inner, key=r"interface, $w_\mathrm{int}$")
+        panel.curves("total closure", key="total, $w$", **TOTAL_LINE)
     else:
-        panel.curves("closure", inner, force.values)
+        panel.curves("closure")
     panel.finish(log="xy" if log else "", zero="" if log else "xy", title="closure", legend=key)
-    if len(marked) and len(inner):
-        row = 0 if shear is None or len(inner) == 1 else nearest(data["shear"], shear)
+    if len(marked) and data.sizes["shear"]:
+        row = 0 if shear is None or data.sizes["shear"] == 1 else nearest(data["shear"], shear)
         steps = [int(step) for step in marked]
-        points = total.scale(inner[row, steps]), force.scale(force.values[row, steps])
+        points = panel.x.scale(panel.values(inner)[row, steps]), panel.y.shown[row, steps]
         mark_points(panel.ax, *points, panel.family.styles[row]["color"])
     return panel.ax
 
@@ -98,20 +96,19 @@ def _draw_laws(closure: Any, laws: Any, key: bool, log: bool, units: Units | Non
     names = ("interface_closure", "nominal_pressure")
     data = result_of(closure, names, PATH, units, "closure")
     fitted = result_of(laws, (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
-    closed, pressure = (quantity(data, name, PATH) for name in names)
-    points, count = closed.values, len(closed.values)
     with Problems("fc.plotting") as problems:
-        same = fitted.sizes["shear"] == count
-        problems.require(same, "laws", f"{count} shears, as of the closure", fitted.sizes["shear"])
+        count, of_laws = data.sizes["shear"], fitted.sizes["shear"]
+        problems.require(of_laws == count, "laws", f"{count} shears, as of the closure", of_laws)
+    panel = LinePanel.of(ax, data, *names, PATH, by_shear(data))
+    points, pressure = panel.x.values, panel.y.values
     if "seated_closure" in fitted:
         points = table(fitted, "seated_closure", PATH)
     seat = float(fitted["seating_pressure"]) if "seating_pressure" in fitted else 0.0
     constants = [table(fitted, name, ("shear",)) for name in LAW_CONSTANTS]
     preferred = table(fitted, "preferred_law", ("shear",)).astype(int)
-    panel = LinePanel(_style.axes_or_new(ax), closed, pressure, by_shear(data))
-    panel.curves("steps", points, pressure.values, ls="", marker="o", ms=3.5)
+    panel.curves("steps", x=points, ls="", marker="o", ms=3.5)
     for i, own in enumerate(panel.family.styles):
-        shown = pressure.values[i][np.isfinite(points[i]) & (pressure.values[i] > seat)]
+        shown = pressure[i][np.isfinite(points[i]) & (pressure[i] > seat)]
         if shown.size < 2:
             continue
         p = np.geomspace(shown.min(), shown.max(), 200)

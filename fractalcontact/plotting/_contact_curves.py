@@ -18,6 +18,7 @@ from fractalcontact.plotting._paths import PATH
 from fractalcontact.plotting._style import Axes, AxesArray, Panels, needs_log_axis
 from fractalcontact.plotting._units import PER_CENT, Quantity, Units, name_of, scale_of
 
+CORRECTED = "corrected for the perimeter"
 OF_THEORY = {"contact_stiffness": "interface_stiffness", "stiffness": "interface_stiffness"}
 
 
@@ -63,20 +64,17 @@ def contact_area(
     nominal pressure (MPa) | real / nominal contact area (%)
     """
     data = result_of(result, ("contact_fraction", against), PATH, units)
-    loads = _paths.loads_of(data, against)
-    cells = quantity(data, "contact_fraction", PATH, "real / nominal contact area")
-    panel = LinePanel(_style.axes_or_new(ax), loads, cells, _paths.by_shear(data))
+    loads, shears, name = _paths.loads_of(data, against), _paths.by_shear(data), "real / nominal contact area"
+    panel = LinePanel.of(ax, data, loads, "contact_fraction", PATH, shears, y_name=name)
     if "corrected_contact_fraction" in data:
-        fraction = table(data, "corrected_contact_fraction", PATH)
-        name = "corrected for the perimeter"
-        panel.curves(name, loads.values, fraction, key=name)
-        panel.curves("cell count", loads.values, cells.values, key="cell count", **_style.DASHED)
+        panel.curves(CORRECTED, "corrected_contact_fraction", key=CORRECTED)
+        panel.curves("cell count", key="cell count", **_style.DASHED)
     else:
-        panel.curves("cell count", loads.values, cells.values)
+        panel.curves("cell count")
     if theory is not None:
         _draw_theories(panel, theory, "contact_fraction", against)
     if log and against != "closure":
-        _draw_proportional(panel, loads.values, cells.values)
+        _draw_proportional(panel, panel.x.values, panel.y.values)
     return panel.finish(log="xy" if log else "", zero="" if log else "xy", title="contact area")
 
 
@@ -151,12 +149,12 @@ def path(
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
     y = quantity(data, names[0], dims, title, np.array(values))
-    panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=_style.MOST_DOTS)
+    panel = LinePanel.of(ax, data, x, y, dims, family, points=_style.MOST_DOTS)
     for name, rows, line in zip(names, values, cycle(_style.LINES), strict=False):
         title = name_of(data[name])
-        panel.curves(title, x.values, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
+        panel.curves(title, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
         if len(rows) == 1 and {f"{name}_low", f"{name}_high"} <= data.variables.keys():
-            low, high = (table(data, f"{name}_{end}", dims)[0] for end in ("low", "high"))
+            low, high = (panel.values(f"{name}_{end}")[0] for end in ("low", "high"))
             panel.band(f"{title}, interval", x.values[0], low, high, family.styles[0]["color"])
     if theory is not None:
         _draw_theories(panel, theory, OF_THEORY.get(names[0], names[0]), against or _paths.load_of(data))
@@ -259,15 +257,11 @@ def area_dimension(
     names = ("contact_fraction", "corrected_contact_fraction", "resolution")
     result = result_of(result, names, ("shear", "step", "resolution"), units)
     data, dims = _paths.at_shear(result, shear), ("step", "resolution")
-    spacing = quantity(data, "resolution", ("resolution",), "spacing")
-    cells = quantity(data, "contact_fraction", dims)
-    panel = LinePanel(
-        _style.axes_or_new(ax), spacing, cells, _paths.by_load(data), points=_style.MAX_MARKED_POINTS
-    )
-    panel.curves("cells", spacing.values, cells.values, key="cells", marker="o")
-    corrected = table(data, "corrected_contact_fraction", dims)
-    name = "corrected for the perimeter"
-    panel.curves(name, spacing.values, corrected, key=name, marker="s", ms=3.5, **_style.DASHED)
+    spacing, loads = quantity(data, "resolution", dims[1:], "spacing"), _paths.by_load(data)
+    panel = LinePanel.of(ax, data, spacing, "contact_fraction", dims, loads)
+    panel.curves("cells", key="cells", marker="o")
+    style = {"marker": "s", "ms": 3.5} | _style.DASHED
+    panel.curves(CORRECTED, "corrected_contact_fraction", key=CORRECTED, **style)
     panel.ax.set_title(_paths.shear_text(data))
     panel.finish(log="xy")
     panel.ax.set_xticks(spacing.shown, [f"{value:g}" for value in spacing.shown])
@@ -303,14 +297,13 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     """
     names = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
     data = result_of(result, names, PATH, units)
-    force, displacement = (quantity(data, name, PATH) for name in names[:2])
-    stuck, contact = (table(data, name, PATH) for name in names[2:])
-    share = stuck / np.where(contact > 0, contact, np.nan)
+    force, displacement, stuck, contact = (quantity(data, name, PATH) for name in names)
+    share = stuck.values / np.where(contact.values > 0, contact.values, np.nan)
     sticking = Quantity(share, PER_CENT, "part of the contact that sticks")
     shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1))
     for ax, x, y in zip(shown, (displacement, force), (force, sticking), strict=True):
         panel = LinePanel(ax, x, y, _paths.by_shear(data), points=_style.MAX_MARKED_POINTS)
-        panel.curves("loading path", x.values, y.values)
+        panel.curves("loading path")
         panel.finish(legend=y is sticking)
     shown[1].set_ylim(0, 105)
     return shown

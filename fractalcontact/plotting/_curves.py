@@ -13,7 +13,6 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.plotting._style import Axes
 
 COLUMNS = ("panel", "curve", "x", "y", "x_axis", "y_axis")
-NUMBER = re.compile(r"[-\N{MINUS SIGN}.\d$]")  # how the label of a number begins
 SYMBOLS = {
     "delta": "δ", "Delta": "Δ", "Lambda": "Λ", "sigma": "σ", "tau": "τ", "theta": "θ", "mathrm": "", "bf": ""
 }  # fmt: skip
@@ -90,17 +89,10 @@ def _of_panel(name: Any, ax: Axes) -> Iterator[tuple[Any, ...]]:
 def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
     """Yield the name and the points of every curve, interval and band that has a name."""
     from matplotlib.collections import LineCollection, PolyCollection
-    from matplotlib.container import ErrorbarContainer
     from matplotlib.patches import Polygon
 
     for line in ax.lines:
         yield str(line.get_label()), line.get_xydata()
-    for container in ax.containers:
-        if isinstance(container, ErrorbarContainer):
-            name = str(container.get_label())
-            yield name, container.lines[0].get_xydata()
-            for bars in container.lines[2]:
-                yield f"{name}, interval", np.concatenate(bars.get_segments() or [np.empty((0, 2))])
     for collection in ax.collections:
         if isinstance(collection, LineCollection):
             segments = [points for points in collection.get_segments() if len(points)]  # none of a NaN
@@ -114,12 +106,13 @@ def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
 
 
 def _names_of_rows(ax: Axes) -> dict[float, str]:
-    """Return what stands at the ticks of the vertical axis where those are words, by the place."""
-    from matplotlib.ticker import FixedLocator
+    """Return what `set_yticks` was told to write at the ticks of the vertical axis, by the place."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter
 
-    texts = [label.get_text() for label in ax.get_yticklabels()]
-    if not isinstance(ax.yaxis.get_major_locator(), FixedLocator) or any(map(NUMBER.match, texts)):
+    is_written = isinstance(ax.yaxis.get_major_formatter(), FuncFormatter)
+    if not (isinstance(ax.yaxis.get_major_locator(), FixedLocator) and is_written):
         return {}
+    texts = [label.get_text() for label in ax.get_yticklabels()]
     return dict(zip(map(float, ax.get_yticks()), texts, strict=False))
 
 

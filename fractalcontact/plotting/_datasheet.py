@@ -301,7 +301,7 @@ def _draw_flow(ax: Axes, data: xr.Dataset, pressure: Quantity, values: Quantity,
     names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
     for i, rows in enumerate(kinds):
         name, line = (names[i], _style.LINES[i % 2]) if names else (values.name, "-")
-        panel.curves(name, pressure.values, rows, key=name if names else "", ls=line, ms=3.0)
+        panel.curves(name, rows, key=name if names else "", ls=line, ms=3.0)
     panel.finish(log="xy", legend=False)
     ax.set_title(values.scale.label(values.name))
     ax.set_ylabel("")

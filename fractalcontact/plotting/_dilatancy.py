@@ -68,35 +68,32 @@ def dilatancy(
 def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     dims = ("direction", "shear")
     data = result_of(data, ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
-    shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "rigid_dilatancy", dims)
-    panel = LinePanel(_style.axes_or_new(ax), shear, opening, _paths.by_direction(data))
-    panel.curves("rigid dilatancy", shear.values, opening.values)
+    panel = LinePanel.of(ax, data, "shear", "rigid_dilatancy", dims, _paths.by_direction(data))
+    panel.curves("rigid dilatancy")
     if "mean_slope" in data:
-        ends = np.array([0.0, np.nanmax(shear.values)])
-        rise = table(data, "mean_slope", ("direction",))[:, None] * ends
-        if np.nanmax(np.abs(rise), initial=0.0) > ON_AXIS * np.nanmax(opening.values, initial=0.0):
-            panel.curves("mean slope", ends, rise, key="mean slope", **_style.DOTTED)
+        ends = np.array([0.0, np.nanmax(panel.x.values)])
+        rise = table(data, "mean_slope", dims[:1])[:, None] * ends
+        if np.nanmax(np.abs(rise), initial=0.0) > ON_AXIS * np.nanmax(panel.y.values, initial=0.0):
+            panel.curves("mean slope", rise, ends, key="mean slope", **_style.DOTTED)
     return panel.finish()
 
 
 def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> Axes:
     data = result_of(data, ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
-    shear, opening = quantity(data, "shear", ("shear",)), quantity(data, "dilatancy", ("step", "shear"))
-    loads, points = _paths.by_load(data), _style.MAX_MARKED_POINTS
-    panel = LinePanel(_style.axes_or_new(ax), shear, opening, loads, points)
-    panel.curves("dilatancy", shear.values, opening.values)
+    loads, points, shear = _paths.by_load(data), _style.MAX_MARKED_POINTS, table(data, "shear", ("shear",))
+    panel = LinePanel.of(ax, data, "shear", "dilatancy", ("step", "shear"), loads, points=points)
+    panel.curves("dilatancy")
     if "rigid_dilatancy" in data:
         style = {"color": _style.ink(), "lw": RIGID_LINE}
-        panel.line("rigid", shear.values, table(data, "rigid_dilatancy", ("shear",)), **style)
+        panel.line("rigid", shear, table(data, "rigid_dilatancy", ("shear",)), **style)
         panel.family = Family([style, *loads.styles], ["0 (rigid)", *loads.labels], loads.name, loads.unit)
     if "direction" in data.coords:
         panel.ax.set_title(f"block slides {_paths.direction_name(words(data['direction'])[0])}")
     for number, target in enumerate(marked):
-        index = nearest(shear.values, target)
-        if np.isclose(shear.values[index], target, rtol=1e-6, atol=0.0):
-            place = slice(index, index + 1)
-            points_shown = shear.shown[place], opening.shown[-1, place]
-            mark_points(panel.ax, *points_shown, loads.styles[-1]["color"], number)
+        index = nearest(shear, target)
+        if np.isclose(shear[index], target, rtol=1e-6, atol=0.0):
+            place = panel.x.shown[-1, [index]], panel.y.shown[-1, [index]]
+            mark_points(panel.ax, *place, loads.styles[-1]["color"], number)
     return panel.finish()
 
 
@@ -128,18 +125,15 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     """
     names, dims = ("correlation", "shear", *LENGTHS), ("direction", "shear")
     data = result_of(memory, names, dims, units, "memory")
-    shear, values = (
-        quantity(data, "shear", ("shear",)),
-        quantity(data, "correlation", dims, "correlation of the faces"),
-    )
-    panel = LinePanel(_style.axes_or_new(ax), shear, values, _paths.by_direction(data), points=0)
-    panel.curves("", shear.values, values.values)
+    family, name = _paths.by_direction(data), "correlation of the faces"
+    panel = LinePanel.of(ax, data, "shear", "correlation", dims, family, y_name=name, points=0)
+    panel.curves("")
     ends = [table(data.isel(shear=0), name, ("direction",)) for name in LENGTHS]
     for own, low, length, high in zip(panel.family.styles, *ends, strict=True):
         if np.isfinite(length):
             panel.place(length, color=own["color"], **_style.DOTTED)
         if np.isfinite(low) and np.isfinite(high):
-            panel.ax.axvspan(*shear.scale([low, high]), color=own["color"], alpha=0.12, lw=0)
+            panel.ax.axvspan(*panel.x.scale([low, high]), color=own["color"], alpha=0.12, lw=0)
     panel.level(0.0, color=_style.grey(), lw=0.6)
     panel.key("decorrelation length", **_style.DOTTED)
     return panel.finish()
@@ -169,7 +163,7 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
     shear = quantity(data, "shear", ("shear",))
     values = quantity(data, DIMENSIONS[0], ("shear",), "dimension of the delta-surface")
     methods = distinct([name.split("_")[0] for name in DIMENSIONS], "method")
-    panel = LinePanel(_style.axes_or_new(ax), shear, values, methods)
+    panel = LinePanel.of(ax, data, shear, values, ("shear",), methods)
     for name, method, own, marker in zip(DIMENSIONS, methods.labels, methods.styles, "osD", strict=True):
-        panel.line(method, shear.values, table(data, name, ("shear",)), marker=marker, ms=3.5, **own)
+        panel.line(method, shear.values, panel.values(name), marker=marker, ms=3.5, **own)
     return panel.finish(log="x" if float(data["shear"].min()) > 0 else "")

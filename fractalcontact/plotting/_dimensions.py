@@ -294,15 +294,14 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     """
     dims = ("wavelength",)
     data = result_of(result, ("hurst", "ci_low", "ci_high", *dims, *WINDOW), dims, units)
-    wavelength = quantity(data, "wavelength", dims)
-    hurst = quantity(data, "hurst", dims, "Hurst exponent")
-    panel = LinePanel(_style.axes_or_new(ax), wavelength, hurst, points=0)
+    panel = LinePanel.of(ax, data, "wavelength", "hurst", dims, y_name="Hurst exponent", points=0)
+    wavelength, hurst = panel.x.values, panel.y.values
     points: dict[str, Any] = {"color": _style.ink(), "marker": "o", "ms": 3.5, "lw": 1.0}
-    low, high = (table(data, name, dims) for name in ("ci_low", "ci_high"))
+    low, high = map(panel.values, ("ci_low", "ci_high"))
     # of an interval beside its value one end shows
-    ends = np.fmin(low, hurst.values), np.fmax(high, hurst.values)
-    panel.bars("octave, 95 %, interval", wavelength.values, *ends, color=_style.ink(), lw=1.0)
-    panel.line("octave, 95 %", wavelength.values, hurst.values, **(points | {"ls": ""}))
+    ends = np.fmin(low, hurst), np.fmax(high, hurst)
+    panel.bars("octave, 95 %, interval", wavelength, *ends, color=_style.ink(), lw=1.0)
+    panel.line("octave, 95 %", wavelength, hurst, **(points | {"ls": ""}))
     panel.key("octave, 95 %", **points)
     window_hurst, bottom, top, *window = (float(table(data, name, ())) for name in WINDOW)
     if np.isfinite(window_hurst):

@@ -44,6 +44,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     >>> [line.get_label() for line in ax.lines]
     ['$\\theta^*_{max}/(C+1)$', 'mean dip']
     """
+    from matplotlib.patheffects import withStroke
     from matplotlib.ticker import MaxNLocator
 
     data = result_of(result, tuple(CURVES), ("azimuth",), units)
@@ -66,8 +67,9 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     polar.yaxis.set_major_formatter("{x:g}" + (angle.unit if angle.unit == "°" else f" {angle.unit}"))
     polar.yaxis.units, polar.yaxis.factor = angle.unit, angle.factor
     polar.set_rlabel_position(22.5)
+    halo = withStroke(linewidth=2.0, foreground=_style.tone(0.0))  # of labels that cross a line
     for tick_label in polar.get_yticklabels():
-        tick_label.set_path_effects(_style.halo())
+        tick_label.set_path_effects([halo])
     _style.side_legend(polar, polar.lines)
     drawn: Axes = polar
     return drawn

@@ -12,7 +12,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import as_dataset, extent_of, require_known_dims, result_of, table
-from fractalcontact.plotting._paths import PATH, at_shear, load_of, load_text, select_path, shear_text
+from fractalcontact.plotting._paths import PATH, at_shear, load_of, select_path, shear_text
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Units, name_of
 
@@ -64,10 +64,10 @@ def contact_domains(
     name = "slip_state" if "slip_state" in names else "state"
     data = result_of(result, (name,), PATH, units)
     require_known_dims(data, {name: (*PATH, "y", "x")})
-    path, dim = select_path(data, shear, normal_force, panels)
-    count, columns = path.sizes[dim], _style.number_of_columns(path.sizes[dim])
+    path = select_path(data, shear, normal_force, panels)
+    state = path.states[name].transpose(path.dim, "y", "x")
+    count, columns = len(state), _style.number_of_columns(len(state))
     width = _style.WIDTH * columns / _style.COLUMNS
-    state = path[name].transpose(dim, "y", "x")
     window = _window(state, zoom, axes, width / columns)
     rows = -(-count // columns)
     has_legend = name == "slip_state" or bool((state > 1).any())
@@ -85,22 +85,19 @@ def contact_domains(
         for unused in grid[:, :-1].ravel()[count:]:
             unused.remove()
     sheet = _style.sheet_of(axes, shown)
-    common = shear_text(path, data) if dim == "step" else load_text(path, data)
+    head = [path.common] if sheet is None else []  # no room above the panels of others
     for number, ax in enumerate(shown):
-        step = path.isel({dim: number})
-        text = load_text(step, data) if dim == "step" else shear_text(step, data)
-        head = [common] if sheet is None else []  # no room above the panels of others
         _maps.draw_flags(ax, state[number])
         letter = rf"$\bf{{{_style.letter(number)}}}$  " if count > 1 else ""
-        parts = filter(None, (*head, text, _share_text(state[number])))
+        parts = filter(None, (*head, path.text(number), _share_text(state[number])))
         ax.set_title(letter + ",  ".join(parts), fontsize="medium")
     for row, ax in enumerate(zooms):
         last = min((row + 1) * columns, count) - 1
         _magnify(ax, shown[last], state[last], window, _style.letter(last))
-    if "x" in path.coords:
+    if "x" in state.coords:
         _maps.draw_scale_bar(shown[(count - 1) // columns * columns], state)
-    if common and sheet is not None:
-        sheet.suptitle(common, x=0.01, ha="left", fontsize="medium")
+    if path.common and sheet is not None:
+        sheet.suptitle(path.common, x=0.01, ha="left", fontsize="medium")
     if has_legend:
         _maps.draw_flag_legend(shown, sheet, name)
     return np.concatenate([shown, zooms]) if len(zooms) else shown

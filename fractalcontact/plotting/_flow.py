@@ -10,7 +10,7 @@ import xarray as xr
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._figure import figure
-from fractalcontact.plotting._inputs import extent_of, quantity, require_dims, result_of, table, words
+from fractalcontact.plotting._inputs import extent_of, quantity, require_dims, result_of, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, path_axis
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
@@ -46,15 +46,13 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     data = result_of(result, ("hydraulic_aperture",), (*PATH, "axis"), units)
     dims, x, family = path_axis(data, None)
     aperture = quantity(data, "hydraulic_aperture", ("axis", *dims))
-    panel = LinePanel(_style.axes_or_new(ax), x, aperture, family, points=_style.MAX_MARKED_POINTS)
+    panel = LinePanel.of(ax, data, x, aperture, dims, family, points=_style.MAX_MARKED_POINTS)
     axes = words(data["axis"]) if "axis" in data.coords else []
     for i, values in enumerate(aperture.values):
         name = f"along {axes[i]}" if axes else "flow"
-        panel.curves(name, x.values, values, key=name if axes else "", ls=_style.LINES[i % 2])
+        panel.curves(name, values, key=name if axes else "", ls=_style.LINES[i % 2])
     if "aperture" in data:
-        panel.curves(
-            "mean gap", x.values, table(data, "aperture", dims), key="mean gap", marker="", **MEAN_LINE
-        )
+        panel.curves("mean gap", "aperture", key="mean gap", marker="", **MEAN_LINE)
     return panel.finish(log="x" if _style.needs_log_axis(x.values) else "", zero="y", title="flow")
 
 
@@ -106,18 +104,12 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     length, pressure = _maps.plane_scale(plane), scale_of(plane)
     place = Quantity(profile[dim].values, length, f"${dim}$")
     panel = LinePanel(right, place, Quantity(profile.values, pressure, "uplift"), points=0)
+    mark: dict[str, Any] = {"marker": "^", "ls": "", "ms": 6, "clip_on": False, "zorder": 3}
     for name in diagrams:
         style = {"color": _style.ink(), **LINES[name]}
         panel.line(name, place.values, profile.sel(diagram=name).values, key=name, **style)
-        action = {"marker": "^", "color": style["color"], "ls": "", "ms": 6}
-        panel.line(
-            "_action",
-            [float(data[f"uplift_{dim}"].sel(diagram=name))],
-            [0.0],
-            clip_on=False,
-            zorder=3,
-            **action,
-        )
+        action = float(data[f"uplift_{dim}"].sel(diagram=name))
+        panel.line("_action", [action], [0.0], color=style["color"], **mark)
     panel.key("line of action", marker="^", ls="")
     start, end = extent_of(plane)[:2] if dim == "x" else extent_of(plane)[2:]
     right.set_xlim(float(length(start)), float(length(end)))

@@ -14,7 +14,6 @@ from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import (
     as_dataset,
     nearest,
-    quantity,
     require_dims,
     require_known_dims,
     result_of,
@@ -143,14 +142,13 @@ def lineage(
     data = result_of(result, ("n_islands", "births", lost), PATH, units)
     dims, x, family = path_axis(data, against)
     shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), sharex=True)
-    counts = quantity(data, "n_islands", dims, "number of islands")
-    births, losses = quantity(data, "births", dims, "islands in a step"), table(data, lost, dims)
-    left, right = (LinePanel(ax, x, y, family, points=_style.MAX_MARKED_POINTS)
-                   for ax, y in zip(shown, (counts, births), strict=True))  # fmt: skip
-    left.curves("islands", x.values, counts.values)
-    right.curves("births", x.values, births.values, key="births")
-    right.curves(lost, x.values, losses, key=lost, **_style.DASHED)
-    coalesces = losses > births.values
+    names = (("n_islands", "number of islands"), ("births", "islands in a step"))
+    left, right = (LinePanel.of(ax, data, x, y, dims, family, y_name=name, points=_style.MAX_MARKED_POINTS)
+                   for ax, (y, name) in zip(shown, names, strict=True))  # fmt: skip
+    left.curves("islands")
+    right.curves("births", key="births")
+    right.curves(lost, lost, key=lost, **_style.DASHED)
+    coalesces = right.values(lost) > right.y.values
     for i in np.flatnonzero(coalesces.any(axis=1)).tolist():
         right.place(x.values[i, np.argmax(coalesces[i])], color=family.styles[i]["color"], **_style.DOTTED)
     if coalesces.any():

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._inputs import quantity, table
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Quantity
 
@@ -67,7 +69,8 @@ def distinct(labels: Sequence[str], heading: str = "") -> Family:
 class LinePanel:
     """Axes with the quantities x and y, on which the curves of a family are drawn in their units.
 
-    All values are SI; `points` is the most points of a curve that are marked.
+    All values are SI; `points` is the most points of a curve that are marked. Variables of `data` are drawn
+    by their names: they are read over `dims`, that of the family and that along the curves.
     """
 
     ax: Axes
@@ -75,6 +78,8 @@ class LinePanel:
     y: Quantity
     family: Family = field(default_factory=lambda: ordered((), count=1))
     points: int = 1
+    data: xr.Dataset = field(default_factory=xr.Dataset)
+    dims: tuple[str, ...] = ()
     entries: list[Any] = field(default_factory=list)
     drawn: list[tuple[Array, Array]] = field(default_factory=list)
 
@@ -83,11 +88,41 @@ class LinePanel:
         self.x.label(self.ax.xaxis)
         self.y.label(self.ax.yaxis)
 
-    def curves(self, what: str, x: Any, y: Any, *, key: str = "", **style: Any) -> None:
+    @classmethod
+    def of(
+        cls,
+        ax: Axes | None,
+        data: xr.Dataset,
+        x: str | Quantity,
+        y: str | Quantity,
+        dims: tuple[str, ...],
+        family: Family | None = None,
+        *,
+        x_name: str = "",
+        y_name: str = "",
+        points: int = 1,
+    ) -> LinePanel:
+        """Return the panel of two variables of a result, on new Axes for None.
+
+        `x_name` and `y_name` replace the names that the variables have on the axes.
+        """
+        names = ((x, x_name), (y, y_name))
+        across, up = (quantity(data, v, dims, name) if isinstance(v, str) else v for v, name in names)
+        family = ordered((), count=1) if family is None else family
+        return cls(_style.axes_or_new(ax), across, up, family, points, data, dims)
+
+    def values(self, name: str) -> Array:
+        """Return a variable of the result, one row for each of the family."""
+        return table(self.data, name, self.dims)
+
+    def curves(self, what: str, y: Any = None, x: Any = None, *, key: str = "", **style: Any) -> None:
         """Draw one curve for each of the family: y has its rows, x has them or is common.
 
-        A `key` is the entry of this kind of curve in the legend.
+        Each is a variable by its name, or an array; by default those of the axes. A `key` is the entry of
+        this kind of curve in the legend.
         """
+        x, y = (own.values if v is None else self.values(v) if isinstance(v, str) else v
+                for v, own in ((x, self.x), (y, self.y)))  # fmt: skip
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         for number, own in enumerate(self.family.styles):
             self.line(self.family.curve(what, number), x[number], y[number], **(own | style))
@@ -152,7 +187,9 @@ class LinePanel:
         `log` and `zero` name the axes that are logarithmic, or start at zero, where the values allow it.
         """
         x, y = (np.concatenate([pair[i].ravel() for pair in self.drawn] or [np.empty(0)]) for i in (0, 1))
-        _style.log_scale(self.ax, x=x if "x" in log else None, y=y if "y" in log else None)
+        for axis, values, set_scale in (("x", x, self.ax.set_xscale), ("y", y, self.ax.set_yscale)):
+            if axis in log and np.unique(values[values > 0]).size > 1:  # one value gives it no limits
+                set_scale("log")
         if "x" in zero and _reaches_up_from_zero(x):
             self.ax.set_xlim(left=0)
         if "y" in zero and _reaches_up_from_zero(y):

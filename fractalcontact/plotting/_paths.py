@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -104,19 +105,49 @@ def at_shear(data: xr.Dataset, shear: float | None) -> xr.Dataset:
     )
 
 
-def select_path(
-    data: xr.Dataset, shear: float | None, normal_force: float | None, most: int
-) -> tuple[xr.Dataset, str]:
-    """Return at most `most` states along the chosen path, and the dim of that path."""
+@dataclass(frozen=True)
+class StatePath:
+    """States along the load path at one shear (the dim is `step`), or along shear under one load."""
+
+    dim: str
+    states: xr.Dataset
+    result: xr.Dataset  # all states, by which units are chosen
+
+    @property
+    def family(self) -> Family:
+        """The family of the curves of the states."""
+        return by_load(self.states) if self.dim == "step" else by_shear(self.states)
+
+    @property
+    def common(self) -> str:
+        """What the states have in common: their shear, or their load."""
+        return (shear_text if self.dim == "step" else load_text)(self.states, self.result)
+
+    def text(self, number: int) -> str:
+        """Return the load or the shear of one of the states."""
+        state = self.states.isel({self.dim: number})
+        return (load_text if self.dim == "step" else shear_text)(state, self.result)
+
+
+def states_along(
+    data: xr.Dataset, dim: str, shear: float | None, normal_force: float | None, most: int | None = None
+) -> StatePath:
+    """Return states along a dim at the nearest shear or force, at most `most` of them."""
+    path = at_shear(data, shear) if dim == "step" else at_force(data, normal_force)
+    count = path.sizes[dim] if most is None else most
+    chosen = loaded_steps(path, count) if dim == "step" else spread_indices(path.sizes[dim], count)
+    return StatePath(dim, path.isel({dim: chosen}), data)
+
+
+def select_path(data: xr.Dataset, shear: float | None, normal_force: float | None, most: int) -> StatePath:
+    """Return at most `most` states along the chosen path."""
     with Problems("fc.plotting") as problems:
         if data.sizes["shear"] > 1 and data.sizes["step"] > 1:
             problems.exactly_one(shear=shear, normal_force=normal_force)
         if normal_force is not None:
             problems.require("normal_force" in data.variables, "result", "the variable 'normal_force'", NONE)
-    if normal_force is not None or (data.sizes["step"] == 1 and shear is None):
-        return at_force(data, normal_force).isel(shear=spread_indices(data.sizes["shear"], most)), "shear"
-    path = at_shear(data, shear)
-    return path.isel(step=loaded_steps(path, most)), "step"
+    is_along_shear = normal_force is not None or (data.sizes["step"] == 1 and shear is None)
+    return states_along(data, "shear" if is_along_shear else "step", shear, normal_force, most)
 
 
 def loaded_steps(path: xr.Dataset, most: int) -> list[int]:

@@ -21,7 +21,7 @@ from fractalcontact.plotting._inputs import (
     table,
 )
 from fractalcontact.plotting._line_panel import Family, LinePanel
-from fractalcontact.plotting._paths import PATH
+from fractalcontact.plotting._paths import PATH, StatePath
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units
 
@@ -91,8 +91,8 @@ def signature(
     shown = path_panels(axes, data)
     null = NULLS[nulls[0]][0] if nulls else ""
     names = ("local_slope", "local dimension")
-    for panel, path, dim in _size_curves(data, shear, normal_force, shown, names, null):
-        _mark_sizes(panel, path, dim)
+    for panel, path in _size_curves(data, shear, normal_force, shown, names, null):
+        _mark_sizes(panel, path.states, path.dim)
         panel.finish(log="x", empty="no contact")
         panel.ax.set_ylim(-0.05, 2.05)
         slopes = panel.y.values[np.isfinite(panel.y.values)]
@@ -170,24 +170,21 @@ def lacunarity(
     require_dims(data, {"lacunarity": "box_size"})
     shown = path_panels(axes, data)
     if maps:
-        for ax, dim, path, _, text in _chosen_paths(data, shear, normal_force, shown, None):
-            name = "shear" if dim == "shear" else _paths.load_of(path)
-            along = _paths.loads_of(path.expand_dims([d for d in PATH if d != dim]), name, _first(dim))
+        for dim, ax in shown.items():
+            path = _paths.states_along(data, dim, shear, normal_force)
+            name = "shear" if dim == "shear" else _paths.load_of(path.states)
+            own = path.states.expand_dims([d for d in PATH if d != dim])
+            along = _paths.loads_of(own, name, PATH if dim == PATH[1] else PATH[::-1])
             places = Quantity(along.values[0], along.scale, along.name)
-            colours = quantity(path, "lacunarity", (dim, "box_size"))
-            _maps.draw_heat_map(ax, places, sizes_of(path, "box_size"), colours)
-            ax.set_title(text)
+            colours = quantity(path.states, "lacunarity", (dim, "box_size"))
+            _maps.draw_heat_map(ax, places, sizes_of(path.states, "box_size"), colours)
+            ax.set_title(path.common)
         return as_array(shown)
-    for panel, _, _ in _size_curves(data, shear, normal_force, shown, ("lacunarity", ""), CELLS_NULL):
+    for panel, _ in _size_curves(data, shear, normal_force, shown, ("lacunarity", ""), CELLS_NULL):
         finite = panel.y.values[np.isfinite(panel.y.values)]
         steep = finite.size > 0 and finite.max() > STEEP * finite.min()
         panel.finish(log="xy" if steep else "x", empty="no contact")
     return as_array(shown)
-
-
-def _first(dim: str) -> tuple[str, str]:
-    """Return the dims of a path with its own dim last."""
-    return PATH if dim == PATH[1] else PATH[::-1]
 
 
 def path_panels(axes: Panels | None, data: xr.Dataset) -> dict[str, Axes]:
@@ -202,23 +199,6 @@ def as_array(panels: dict[str, Axes]) -> AxesArray:
     return np.array(list(panels.values()), dtype=object)
 
 
-def _chosen_paths(
-    data: xr.Dataset, shear: float | None, force: float | None, shown: dict[str, Axes], most: int | None
-) -> Iterator[tuple[Axes, str, xr.Dataset, Family, str]]:
-    """Yield for each panel its dim, the states along it (at most `most`), their family and its title."""
-    for dim, ax in shown.items():
-        path = _paths.at_shear(data, shear) if dim == "step" else _paths.at_force(data, force)
-        text = _paths.shear_text(path, data) if dim == "step" else _paths.load_text(path, data)
-        count = path.sizes[dim] if most is None else most
-        chosen = (
-            _paths.loaded_steps(path, count)
-            if dim == "step"
-            else _style.spread_indices(path.sizes[dim], count)
-        )
-        path = path.isel({dim: chosen})
-        yield ax, dim, path, _paths.by_load(path) if dim == "step" else _paths.by_shear(path), text
-
-
 def _size_curves(
     data: xr.Dataset,
     shear: float | None,
@@ -226,21 +206,21 @@ def _size_curves(
     shown: dict[str, Axes],
     names: tuple[str, str],
     null: str,
-) -> Iterator[tuple[LinePanel, xr.Dataset, str]]:
+) -> Iterator[tuple[LinePanel, StatePath]]:
     """Draw a variable over box size, beside its random null, and yield the panels to be finished."""
     name, title = names
-    for ax, dim, path, family, text in _chosen_paths(data, shear, force, shown, _style.MOST_CURVES):
-        over = next(str(last) for last in path[name].dims[::-1] if last not in PATH)
-        values = quantity(path, name, (dim, over), title)
-        panel = LinePanel(ax, sizes_of(path, over), values, family)
-        panel.curves("contact domain", panel.x.values, values.values)
-        if f"null_{name}" in path:
-            style = _style.DASHED | {"marker": ""}
+    for dim, ax in shown.items():
+        path = _paths.states_along(data, dim, shear, force, _style.MOST_CURVES)
+        states = path.states
+        over = next(str(last) for last in states[name].dims[::-1] if last not in PATH)
+        sizes = sizes_of(states, over)
+        panel = LinePanel.of(ax, states, sizes, name, (dim, over), path.family, y_name=title)
+        panel.curves("contact domain")
+        if f"null_{name}" in states:
             key = null if ax is list(shown.values())[-1] else ""
-            beside = table(path, f"null_{name}", (dim, over))
-            panel.curves("random null", panel.x.values, beside, key=key, **style)
-        ax.set_title(text)
-        yield panel, path, dim
+            panel.curves("random null", f"null_{name}", key=key, marker="", **_style.DASHED)
+        ax.set_title(path.common)
+        yield panel, path
 
 
 def sizes_of(data: xr.Dataset, over: str) -> Quantity:
@@ -314,27 +294,25 @@ def _draw_dimension(
 ) -> LinePanel:
     """Draw one curve for each of the family with its random null, its points and, if alone, its interval."""
     load = "shear" if dims[1] == "shear" else _paths.load_of(path) or "coverage"
-    x, y = _paths.loads_of(path, load, dims), quantity(path, name, dims)
-    panel = LinePanel(ax, x, y, family, points=0)
-    reliable, described = np.full(y.values.shape, True), "interval wider than 0.5, or none"
+    panel = LinePanel.of(ax, path, _paths.loads_of(path, load, dims), name, dims, family, points=0)
+    x, y = panel.x.values, panel.y.values
+    reliable, described = np.full(y.shape, True), "interval wider than 0.5, or none"
     panel.key("contact domain", marker="o")
     if set(INTERVAL) <= path.variables.keys():
-        low, high = (table(path, end, dims) for end in INTERVAL)
+        low, high = map(panel.values, INTERVAL)
         reliable = high - low <= WIDE_INTERVAL
         panel.area_key("interval", facecolor=_style.grey(), alpha=0.25)
-        if len(y.values) == 1:
-            panel.band(family.curve("interval"), x.values[0], low[0], high[0], family.styles[0]["color"])
+        if len(y) == 1:
+            panel.band(family.curve("interval"), x[0], low[0], high[0], family.styles[0]["color"])
     if "follows_power_law" in path:
-        reliable = reliable & (table(path, "follows_power_law", dims) != 0)
+        reliable = reliable & (panel.values("follows_power_law") != 0)
         described = "no power law, or wide interval"
-    panel.curves("contact domain", x.values, y.values)
-    if y.values.shape[1] <= _style.MAX_MARKED_POINTS:
+    panel.curves("contact domain")
+    if y.shape[1] <= _style.MAX_MARKED_POINTS:
         for i, own in enumerate(family.styles):
-            panel.flagged("_points", x.values[i], y.values[i], reliable[i], **own)
-    if not reliable[np.isfinite(y.values)].all():
+            panel.flagged("_points", x[i], y[i], reliable[i], **own)
+    if not reliable[np.isfinite(y)].all():
         panel.key(described, ls="", marker="o", mfc=_style.tone(0.0))
     if "null_dimension" in path:
-        panel.curves(
-            "random null", x.values, table(path, "null_dimension", dims), key=CELLS_NULL, **_style.DASHED
-        )
+        panel.curves("random null", "null_dimension", key=CELLS_NULL, **_style.DASHED)
     return panel

@@ -54,13 +54,12 @@ def strength_envelope(
     strength = quantity(data, "shear_strength", dims, shown=every)
     # one unit on both axes, so that a slope can be read as a friction coefficient
     pressure = Quantity(pressure.values, strength.scale, pressure.name)
-    in_range = table(data, "in_range", dims) > 0
-    authors = [
-        " and ".join(part.capitalize() for part in name.split("_")) for name in words(data["criterion"])
-    ]
-    panel = LinePanel(_style.axes_or_new(ax), pressure, strength, distinct(authors), points=0)
-    panel.curves("", pressure.values, strength.values, **_style.DOTTED)
-    panel.curves("in range", pressure.values, np.where(in_range, strength.values, np.nan))
+    parts = [name.split("_") for name in words(data["criterion"])]
+    authors = distinct([" and ".join(part.capitalize() for part in each) for each in parts])
+    panel = LinePanel.of(ax, data, pressure, strength, dims, authors, points=0)
+    in_range = panel.values("in_range") > 0
+    panel.curves("", **_style.DOTTED)
+    panel.curves("in range", np.where(in_range, strength.values, np.nan))
     if not in_range.all():
         panel.key("out of range", **_style.DOTTED)
     if tests is not None:
@@ -180,15 +179,11 @@ def friction(
     data = result_of(selected, (*names, "shear"), ("shear", over))
     size = (_style.WIDTH if len(names) > 1 else _style.PANEL[0], 3.1)
     shown = _style.panel_row(axes, len(names), size, sharex=True)
-    shear, family = (
-        quantity(data, "shear", ("shear",)),
-        _paths.by_load(data) if by_force else _paths.by_direction(data),
-    )
+    family, points = (_paths.by_load if by_force else _paths.by_direction)(data), _style.MAX_MARKED_POINTS
     for ax, name in zip(shown, names, strict=True):
-        values = quantity(data, name, (over, "shear"))
-        panel = LinePanel(ax, shear, values, family, points=_style.MAX_MARKED_POINTS)
-        panel.curves(name.replace("_", " "), shear.values, values.values)
-        is_wide = name == "shear_strength" and _style.needs_log_axis(values.values)
+        panel = LinePanel.of(ax, data, "shear", name, (over, "shear"), family, points=points)
+        panel.curves(name.replace("_", " "))
+        is_wide = name == "shear_strength" and _style.needs_log_axis(panel.y.values)
         if name == "friction_angle" and "basic_friction_angle" in data:
             basic_angle = float(np.ravel(data["basic_friction_angle"].values)[0])
             panel.level(basic_angle, color=_style.ink(), **_style.DOTTED)
@@ -243,11 +238,10 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     data = result_of(result, names, dims, units)
     size = quantity(data, "structure_size", ("structure_size",), "size of the structure")
     strength, shears = quantity(data, "shear_strength", dims), _paths.by_shear(data)
-    panel = LinePanel(_style.axes_or_new(ax), size, strength, _paths.by_direction(data), points=1)
+    panel = LinePanel.of(ax, data, size, strength, dims[1:], _paths.by_direction(data))
     for i, values in enumerate(strength.values):
-        line = _style.LINES[i % 3]
         key = shears.labels[i] if shears.labels else ""
-        panel.curves(shears.curve("shear strength", i), size.values, values, key=key, ls=line)
+        panel.curves(shears.curve("shear strength", i), values, key=key, ls=_style.LINES[i % 3])
     angle = np.radians(table(data, "basic_friction_angle", ()))
     basic = table(data, "nominal_pressure", ("structure_size",)) * np.tan(angle)
     name = "basic angle alone"

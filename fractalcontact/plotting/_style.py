@@ -260,21 +260,6 @@ def letter(number: int) -> str:
     return chr(ord("A") + number) if number < 26 else str(number + 1)
 
 
-def halo() -> list[Any]:
-    """Return an outline in the colour of the axes, which keeps text readable where it crosses a line."""
-    from matplotlib.patheffects import withStroke
-
-    return [withStroke(linewidth=2.0, foreground=tone(0.0))]
-
-
-def log_scale(ax: Axes, *, x: Any = None, y: Any = None) -> None:
-    """Make an axis logarithmic if it has several positive values to show: one gives it no limits."""
-    for values, setter in ((x, ax.set_xscale), (y, ax.set_yscale)):
-        shown = np.asarray([] if values is None else values, dtype=float)
-        if np.unique(shown[shown > 0]).size > 1:
-            setter("log")
-
-
 def needs_log_axis(values: Any) -> bool:
     """Return True for positive values whose ratio exceeds `LOG_AXIS_RATIO`."""
     shown = np.asarray(values, dtype=float)
