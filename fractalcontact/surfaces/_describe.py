@@ -187,16 +187,14 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
             values = block[first : first + rows]
             is_known = ~np.isnan(values)
             powers += _powers(values[is_known], mean)
-            # a slope along y needs the row before, the Laplacian two: each pair and triple counts once
+            # a slope along y needs the row before, the Laplacian two: what lies in these alone was counted
             joined = np.concatenate([before, values])
             if axes == 1:
                 sums += _neighbours(values[0], steps, (False,), scale / unit)
             else:
-                own, with_one, with_two = (
-                    _neighbours(joined[max(0, len(before) - k) :], steps, (False, False), scale / unit)
-                    for k in range(3)
-                )
-                sums += with_one[0], own[1], with_two[2], with_one[3]
+                sums += _neighbours(joined, steps, (False, False), scale / unit)
+                if len(before):
+                    sums -= _neighbours(before, steps, (False, False), scale / unit)
             before = joined[-2:].copy()
             # least-squares plane of 1, x and y
             filled = np.where(is_known, values, 0.0)
