@@ -12,7 +12,7 @@ import numpy as np
 from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import GIVEN, Problems
 
-AZIMUTHS = {"E": 0.0, "NE": 45.0, "N": 90.0, "NW": 135.0, "W": 180.0, "SW": 225.0, "S": 270.0, "SE": 315.0}
+AZIMUTHS = {name: 45.0 * i for i, name in enumerate(("E", "NE", "N", "NW", "W", "SW", "S", "SE"))}
 COMPASS = ("E", "N", "W", "S")
 WORDS = {"east": "E", "north": "N", "west": "W", "south": "S"}
 EXPECTED = f"one of {', '.join(AZIMUTHS)}, or an azimuth in degrees"

@@ -22,9 +22,8 @@ from fractalcontact.base.validation import Problems, reading
 
 DAMAGED = "is damaged, or is not a complete NetCDF file"
 _MARK = b"\nCRC-32 of the bytes before this line: "
-_LENGTH = len(_MARK) + 9  # eight digits and the end of the line
-_LEAST = 8  # bytes of the line by which one that was cut off is known
-_BLOCK = 1 << 20  # bytes
+_LENGTH = len(_MARK + b"00000000\n")
+_LEAST = 8  # bytes of the line by which one that was cut off is known: eight arbitrary ones are never these
 
 
 @dataclass(frozen=True)
@@ -110,6 +109,6 @@ def _line(path: Path, size: int) -> bytes:
     """Return the line for the first `size` bytes of a file."""
     value = 0
     with path.open("rb") as file:
-        for start in range(0, size, _BLOCK):
-            value = zlib.crc32(file.read(min(_BLOCK, size - start)), value)
+        while left := size - file.tell():
+            value = zlib.crc32(file.read(min(left, 1 << 20)), value)
     return _MARK + f"{value:08x}\n".encode()

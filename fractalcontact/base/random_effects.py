@@ -16,8 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-LEVEL = 0.95
-
 
 @dataclass(frozen=True)
 class RandomEffects:
@@ -32,7 +30,7 @@ class RandomEffects:
     count: int
 
 
-def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
+def random_effects(values: ArrayLike, errors: ArrayLike = 0.0, level: float = 0.95) -> RandomEffects:
     """Return the random-effects mean of values with the standard errors of each, of those that are finite.
 
     Values without errors have the mean and the interval of Student. One value alone has the interval of its
@@ -46,7 +44,7 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
     count = x.size
     if count < 2:
         mean = float(x[0]) if count else np.nan
-        half = ndtri(0.5 + LEVEL / 2) * np.sqrt(variance[0]) if count and variance[0] > 0 else np.nan
+        half = ndtri(0.5 + level / 2) * np.sqrt(variance[0]) if count and variance[0] > 0 else np.nan
         within = float(s[known].mean()) if count else np.nan
         return RandomEffects(mean, mean - half, mean + half, np.nan, within, np.nan, count)
     tau2, within = _between(x, variance), float(np.sqrt(variance.mean()))
@@ -57,7 +55,7 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0) -> RandomEffects:
     mean = float(weight @ x / weight.sum())
     # the q of Hartung and Knapp, at least 1: otherwise values that agree by chance have too short an interval
     q = max(1.0, float(weight @ (x - mean) ** 2) / (count - 1))
-    half = float(stdtrit(count - 1, 0.5 + LEVEL / 2) * np.sqrt(q / weight.sum()))
+    half = float(stdtrit(count - 1, 0.5 + level / 2) * np.sqrt(q / weight.sum()))
     return RandomEffects(
         mean, mean - half, mean + half, float(np.sqrt(tau2)), within, tau2 / (tau2 + within**2), count
     )

@@ -39,7 +39,6 @@ class Quantity:
         return {"long_name": self.long_name} | units | self.attributes
 
 
-OPEN, CONTACT, YIELDED = 0, 1, 2
 STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
 SMALL = 4096  # bytes of a variable other than a map, up to which compression saves no space
 
@@ -51,10 +50,11 @@ def _flags(meanings: str, first: int = 0) -> dict[str, Any]:
 
 
 _STATE = _flags("open contact yielded")
+OPEN, CONTACT, YIELDED = range(3)
 _STOP = _flags("converged rounding stagnated iteration_limit force_missed beyond_full_contact")
 STOP_REASONS = dict(zip(_STOP["flag_meanings"].split(), _STOP["flag_values"], strict=True))
-STICK, SLIP = 1, 2
 _SLIP_STATE = _flags("open stick slip")
+_, STICK, SLIP = range(3)
 _SLIP_METHOD = _flags("superposition full")
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")  # that `partial_slip` can return
 CONTACT_MAPS = ("state", "pressure", "gap", "displacement", "residual_height")  # that `press` can return

@@ -15,7 +15,7 @@ from contextvars import ContextVar
 from queue import SimpleQueue
 from typing import Any
 
-SHARE = 32768  # elements worth a thread of their own
+SHARE = 32768  # elements worth a thread of their own: a transform takes 33 us, to hand it over 17 us
 LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
 MOST_OPENBLAS = 64  # threads for which the wheels of NumPy and SciPy are built
 NAME = "fractalcontact"  # of the threads that wait for bands

@@ -17,11 +17,10 @@ from fractalcontact.plotting._paths import PATH, by_shear
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
-LETTER, LETTER_NAME = 14.0, "letter of a marked point"  # points, diameter of the circle
+LETTER = 14.0  # points, diameter of the circle around a letter of half that size
+LETTER_NAME = "letter of a marked point"
 LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
-LAWS = {"exponential": _style.LINES[1], "hyperbolic": _style.LINES[2]}  # line where not preferred
-PREFERRED, OTHER = 1.8, 0.9  # points, width of the line of a law
-TOTAL_LINE: dict[str, Any] = {"lw": 0.8, "alpha": 0.75}  # weaker than the curve of the interface
+LAWS = {"exponential": _style.DASHED, "hyperbolic": _style.DOTTED}  # line where not preferred
 
 
 @figure
@@ -79,7 +78,7 @@ def closure_laws(
     inner = "interface_closure" if "interface_closure" in data else "closure"
     if inner == "interface_closure":
         panel.curves("interface closure", x=inner, key=r"interface, $w_\mathrm{int}$")
-        panel.curves("total closure", key="total, $w$", **TOTAL_LINE)
+        panel.curves("total closure", key="total, $w$", lw=_style.THIN)
     else:
         panel.curves("closure")
     panel.finish(log="xy" if log else "", zero="" if log else "xy", title="closure", legend=key)
@@ -115,12 +114,12 @@ def _draw_laws(closure: Any, laws: Any, key: bool, log: bool, units: Units | Non
         length, reference, stiffness, greatest = (values[i] for values in constants)
         with np.errstate(all="ignore"):  # constants of faces that close by rounding alone
             curves = (length * np.log(p / reference), (p - seat) / (stiffness + (p - seat) / greatest))
-        for number, ((name, line), curve) in enumerate(zip(LAWS.items(), curves, strict=True), 1):
-            style = {"lw": PREFERRED} if number == preferred[i] else {"lw": OTHER, "ls": line}
-            panel.line(panel.family.curve(f"{name} law", i), curve, p, **(own | style))
-    panel.key("preferred", lw=PREFERRED)
-    for name, line in LAWS.items():
-        panel.key(f"{name}, not preferred", lw=OTHER, ls=line)
+        for number, ((name, other), curve) in enumerate(zip(LAWS.items(), curves, strict=True), 1):
+            style = own if number == preferred[i] else own | other
+            panel.line(panel.family.curve(f"{name} law", i), curve, p, **style)
+    panel.key("preferred")
+    for name, other in LAWS.items():
+        panel.key(f"{name}, not preferred", **other)
     return panel.finish(log="xy" if log else "y", title="law", legend=key)
 
 

@@ -23,9 +23,7 @@ from fractalcontact.plotting._style import Axes, AxesArray, Figure
 from fractalcontact.plotting._units import PER_LENGTH, Quantity
 
 A4 = (8.27, 11.69)  # inches
-ROWS = (0.95, 3.0, 2.7, 2.5, 2.05)  # relative heights: title, strength, shear, stiffness and flow, limits
-SHEAR_ROW, EMPTY = 2, 0.05  # a page without a shear test leaves no room for one
-COLUMNS, MOST_LINES = 165, 17  # of the text of the limits
+COLUMNS, MOST_LINES = 165, 17  # of the text of the limits: what fits into its row in 6.5 points
 FLOW = Scale(1.0, "m³")  # transmissivities span decades: no prefix suits them all
 # what a consultant has to answer for, with its symbol and its unit
 INPUTS = {
@@ -106,8 +104,9 @@ def _draw_page(
     panels: dict[str, Axes] = {}
     tests, curve = found["direct_shear"], found["shear_curve"]
     is_sheared = tests is not None or curve is not None
-    ratios = [EMPTY if i == SHEAR_ROW and not is_sheared else row for i, row in enumerate(ROWS)]
-    parts: Any = page.subfigures(len(ROWS), 1, height_ratios=ratios)
+    # title, strength, shear test (no room without one), stiffness and flow, limits
+    ratios = (0.95, 3.0, 2.7 if is_sheared else 0.05, 2.5, 2.05)
+    parts: Any = page.subfigures(len(ratios), 1, height_ratios=ratios)
     title = str(tree.attrs.get("title") or tree.name or "joint")
     parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
     facts = "\n".join([_source(tree), *_input_lines(found)])

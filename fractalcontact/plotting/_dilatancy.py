@@ -11,11 +11,10 @@ from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._closure import mark_points
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import nearest, quantity, result_of, table, words
-from fractalcontact.plotting._line_panel import Family, LinePanel, distinct
+from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel, distinct
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
-RIGID_LINE = 1.0  # points, width
 ON_AXIS = 0.005  # of the height of the axes: a line that rises by less lies on the axis of a level face
 
 
@@ -84,7 +83,7 @@ def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> A
     panel = LinePanel.of(ax, data, "shear", "dilatancy", ("step", "shear"), loads, points=points)
     panel.curves("dilatancy")
     if "rigid_dilatancy" in data:
-        style = {"color": _style.ink(), "lw": RIGID_LINE}
+        style = {"color": _style.ink(), "lw": _style.THIN}
         panel.line("rigid", shear, table(data, "rigid_dilatancy", ("shear",)), **style)
         panel.family = Family([style, *loads.styles], ["0 (rigid)", *loads.labels], loads.name, loads.unit)
     if "direction" in data.coords:
@@ -133,7 +132,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
         if np.isfinite(length):
             panel.place(length, color=own["color"], **_style.DOTTED)
         if np.isfinite(low) and np.isfinite(high):
-            panel.ax.axvspan(*panel.x.scale([low, high]), color=own["color"], alpha=0.12, lw=0)
+            panel.ax.axvspan(*panel.x.scale([low, high]), color=own["color"], alpha=BAND_OPACITY, lw=0)
     panel.level(0.0, color=_style.grey(), lw=0.6)
     panel.key("decorrelation length", **_style.DOTTED)
     return panel.finish()

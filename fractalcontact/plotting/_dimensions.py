@@ -268,7 +268,6 @@ def dimensions(
 
 LOWEST, HIGHEST = -1.5, 2.5  # exponents on the axis
 WINDOW = ("window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale_max")
-OPACITY = 0.35  # of the band, the result of the figure
 
 
 @figure
@@ -305,9 +304,9 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     panel.key("octave, 95 %", **points)
     window_hurst, bottom, top, *window = (float(table(data, name, ())) for name in WINDOW)
     if np.isfinite(window_hurst):
-        panel.band("one exponent, 95 %", window, bottom, top, _style.BLUE, alpha=OPACITY)
+        panel.band("one exponent, 95 %", window, bottom, top, _style.BLUE, alpha=0.35)
         panel.line("one exponent", window, 2 * [window_hurst], color=_style.BLUE, lw=1.2)
-        panel.area_key("one exponent", facecolor=_style.BLUE, alpha=OPACITY)
+        panel.area_key("one exponent", facecolor=_style.BLUE, alpha=0.35)
     for limit in (0.0, 1.0):
         panel.level(limit, color=_style.grey(), lw=0.7, ls=":")
     panel.ax.set_xscale("log")

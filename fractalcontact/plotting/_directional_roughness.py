@@ -13,12 +13,11 @@ from fractalcontact.plotting._inputs import require_dims, result_of
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units, scale_of
 
-SIZE = (5.0, 4.0)  # inches
 RINGS = 4  # at most, so that their labels stay apart
 COMPASS = ("E", "45°", "N", "135°", "W", "225°", "S", "315°")
 CURVES: dict[str, tuple[str, dict[str, Any]]] = {
     "roughness_metric": ("$\\theta^*_{max}/(C+1)$", {"color": _style.BLUE, "ls": "-"}),
-    "mean_dip": ("mean dip", {"color": _style.RED, "ls": "--", "lw": 1.0}),
+    "mean_dip": ("mean dip", {"color": _style.RED} | _style.DASHED),
 }
 
 
@@ -49,7 +48,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
 
     data = result_of(result, tuple(CURVES), ("azimuth",), units)
     require_dims(data, dict.fromkeys(CURVES, "azimuth"))
-    polar: Any = _style.axes_or_new(ax, SIZE, projection="polar")
+    polar: Any = _style.axes_or_new(ax, (_style.PANEL[0], _style.MAP[1]), projection="polar")
     with Problems("fc.plotting") as problems:
         problems.require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)
     azimuth = data["azimuth"].values

@@ -12,9 +12,9 @@ import xarray as xr
 
 from fractalcontact.base.study import MEMBER
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._line_panel import BAND_OPACITY
 from fractalcontact.plotting._style import Axes
 
-SAME = 1e-12  # relative; equal curves may be shown in different units
 MEDIAN, BAND = 0.5, (0.16, 0.84)  # the band of one standard deviation to either side, if normal
 
 
@@ -84,14 +84,14 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         )
         if x_low.size < 2 or x_low.size != x_high.size:
             continue
-        if np.allclose(x_low, x_high, rtol=SAME, atol=0) and np.allclose(y_low, y_high, rtol=SAME, atol=0):
+        if np.allclose(x_low, x_high, atol=0) and np.allclose(y_low, y_high, atol=0):  # no band to be seen
             continue
         finite = np.isfinite(x_low + y_low + x_high + y_high)
         x = np.concatenate([x_low[finite], x_high[finite][::-1]])
         y = np.concatenate([y_low[finite], y_high[finite][::-1]])
         name = str(line.get_label())
         label = name if name.startswith("_") else f"{name}, central 68 %"
-        ax.fill(x, y, color=line.get_color(), alpha=0.15, linewidth=0, zorder=0.5, label=label)
+        ax.fill(x, y, color=line.get_color(), alpha=BAND_OPACITY, linewidth=0, zorder=0.5, label=label)
         limits = _widened(limits[0], x), _widened(limits[1], y)
         count += 1
     if count:

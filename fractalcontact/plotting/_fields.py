@@ -275,7 +275,6 @@ def first_contact(
         f"{name_of(plane) if name else 'step'} of first contact",
         _style.needs_log_axis(loads[loads > 0]),
     )
-    pale = _style.STATE_COLOURS[0]
-    _maps.draw_values(ax, plane, missing=pale, name=title, log=log, clipped=0.0, readable=True)
+    _maps.draw_values(ax, plane, missing=_style.OPEN_COLOUR, name=title, log=log, clipped=0.0, readable=True)
     ax.set_title(shear_text(path, data))
     return ax

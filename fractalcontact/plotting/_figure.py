@@ -90,6 +90,14 @@ def _are_numbers(value: Any) -> bool:
     return values is not None and values.ndim == 1 and bool(np.isfinite(values).all())
 
 
+def _are_ends(value: Any) -> bool:
+    return _are_numbers(value) and len(value) == 2
+
+
+def _is_count(value: Any) -> bool:
+    return is_real(value) and isinstance(value, (int, np.integer)) and bool(value >= 1)
+
+
 def _are_words(value: Any) -> bool:
     return isinstance(value, (list, tuple)) and all(isinstance(word, str) for word in value)
 
@@ -107,7 +115,7 @@ OPTIONS: dict[str, tuple[str, Test]] = {
     **dict.fromkeys(("against", "title", "band_name"), ("words", lambda value: isinstance(value, str))),
     "ax": ("an Axes, or None", _is_axes),
     "axes": ("a sequence of Axes, a Figure or SubFigure, or None", _are_panels),
-    "band": ("two numbers", lambda value: _are_numbers(value) and len(value) == 2),
+    "band": ("two numbers", _are_ends),
     "block": ("a DataArray with x and y", lambda value: isinstance(value, xr.DataArray)),
     "direction": (
         "a word or degrees anticlockwise from E",
@@ -116,14 +124,11 @@ OPTIONS: dict[str, tuple[str, Test]] = {
     "figure": ("a Figure or SubFigure, or None", _is_sheet),
     "marked": ("a sequence of numbers", _are_numbers),
     "notes": ("a sequence of words", _are_words),
-    "panels": (
-        "an integer >= 1",
-        lambda value: is_real(value) and isinstance(value, (int, np.integer)) and bool(value >= 1),
-    ),
+    "panels": ("an integer >= 1", _is_count),
     "tree": ("a DataTree", lambda value: isinstance(value, xr.DataTree)),
     "units": UNITS_EXPECTED,
     "variable": (
         "the name of a variable, or several",
-        lambda value: isinstance(value, str) or (_are_words(value) and len(value) > 0),
+        lambda value: isinstance(value, str) or (_are_words(value) and bool(value)),
     ),
 }

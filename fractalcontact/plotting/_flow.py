@@ -16,7 +16,7 @@ from fractalcontact.plotting._paths import PATH, path_axis
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, scale_of
 
-# broad and pale, so that it is seen where the hydraulic aperture lies on it
+# three times as broad as a curve and pale, so that it is seen where the hydraulic aperture lies on it
 MEAN_LINE: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", "zorder": 1.5}
 
 
@@ -56,11 +56,10 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     return panel.finish(log="x" if _style.needs_log_axis(x.values) else "", zero="y", title="flow")
 
 
-SIZE = (9.0, 3.6)  # inches
 LINES: dict[str, dict[str, Any]] = {
     "joint": {"color": _style.BLUE, "ls": "-"},
-    "linear": {"ls": "--", "lw": 1.0},
-    "bilinear": {"color": _style.RED, "ls": "-.", "lw": 1.0},
+    "linear": _style.DASHED,
+    "bilinear": {"color": _style.RED} | _style.DASH_DOTTED,
 }
 
 
@@ -97,7 +96,7 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
         diagrams = words(data["diagram"])
         are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
         problems.require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)
-    left, right = shown = _style.panel_row(axes, 2, SIZE, width_ratios=(1.0, 1.1))
+    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), width_ratios=(1.0, 1.1))
     _maps.draw_values(left, plane)
     left.set_title(_state(data))
     dim = "x" if "x" in profile.dims else "y"

@@ -163,7 +163,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 LARGEST = 20  # islands of the last state with a colour of their own: more could not be told apart
 BAR = 0.08  # half the width of a bar, over the distance of two states
 THIN = 0.01  # of the axis: a bar that is lower has no edge, which would hide it
-MOST_LABELS = 8  # of loads below a figure of usual width
 BEND = np.linspace(0.0, 1.0, 24)  # along a ribbon: smooth at the size of a printed figure
 COLUMNS = ("island_before", "island_after", "common_cells", "cells_before", "cells_after", "link_step")
 
@@ -244,7 +243,7 @@ def alluvial(
         scale = scale_of(path[name])
         texts = number_texts(scale, table(path, name, ("step",)), 3)
     ax.set(xlabel=scale.label(name_of(path[name])) if name else "step", ylabel="cells in contact")
-    shown = _style.spread_indices(len(stacks), MOST_LABELS)
+    shown = _style.spread_indices(len(stacks), _style.MAX_LEGEND_ENTRIES)
     ax.set_xticks(shown, [texts[place] for place in shown])
     ax.set_title(shear_text(path, data))
     ax.autoscale_view()

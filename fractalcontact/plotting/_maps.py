@@ -98,7 +98,7 @@ def draw_values(
         light = _light(filled, spacing)
         image = np.clip(image * (1.0 + SHADING * (light - light.mean()))[..., None], 0.0, 1.0)
     if positive:
-        image[values == 0] = to_rgb(_style.STATE_COLOURS[0])
+        image[values == 0] = to_rgb(_style.OPEN_COLOUR)
     image[is_missing] = to_rgb(missing)
     draw_image(ax, image, plane)
     label_axes(ax, plane)
@@ -172,7 +172,7 @@ def draw_labels(ax: Axes, plane: xr.DataArray) -> None:
     labels = np.asarray(plane.values).astype(np.int64)
     hues = matplotlib.colormaps[_style.SEQUENCE_MAP](np.linspace(0, 0.9, PALETTE))[:, :3]
     image = hues[(labels * 5) % PALETTE]  # consecutive labels are often neighbours and need unlike colours
-    image[labels <= 0] = matplotlib.colors.to_rgb(_style.STATE_COLOURS[0])
+    image[labels <= 0] = matplotlib.colors.to_rgb(_style.OPEN_COLOUR)
     draw_image(ax, image, plane)
     label_axes(ax, plane)
     count = np.unique(labels[labels > 0]).size

@@ -21,7 +21,6 @@ FIRST = {
     "rms_height": "height Sq",
 }
 NOT_SHOWN = ("_low", "_high", "_error")  # endings of variables
-NAMED = 6  # outliers in a panel that are named
 
 
 @figure
@@ -73,7 +72,7 @@ def _draw_distribution(ax: Any, data: Any, name: str) -> None:
     ax.plot(x[~far], rank[~far], "o", ms=3, color=_style.BLUE)
     ax.plot(x[far], rank[far], "o", ms=4, color=_style.RED)
     ax.axvline(np.median(x), color=_style.grey(), ls="--", lw=0.8)
-    for place in np.flatnonzero(far)[:NAMED]:
+    for place in np.flatnonzero(far)[: _style.MAX_LEGEND_ENTRIES]:
         is_left = x[place] < np.mean(ax.get_xlim())
         ax.annotate(
             str(data[SCAN].values[order[place]]), (x[place], rank[place]), fontsize="x-small",

@@ -24,7 +24,7 @@ Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | matplotlib.figure.Sub
 
 STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` writes
 FONT_SIZE = 9.0  # points; the sizes of figures below are for text of this size
-WIDTH = 7.2  # inches, a figure with several panels
+WIDTH = 7.2  # inches, a figure with several panels: A4 less margins of 13 mm
 PANEL = (5.2, 3.5)  # inches, a figure with one panel and its legend
 MAP = (4.6, 3.8)  # inches, a figure with one map and its colour bar
 COLUMNS = 3  # of panels, at most
@@ -42,8 +42,9 @@ COLOURS = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY)
 DIRECTION_COLOURS = {"E": RED, "N": GREEN, "W": BLUE, "S": ORANGE}
 DIRECTION_LINES = {"E": "-", "N": "--", "W": "-", "S": "--"}
 MISSING = "#D9D9D9"
-STATE_COLOURS = ("#F2F0E9", "#12355B", RED)  # open, contact, yielded
-SLIP_COLOURS = (STATE_COLOURS[0], STATE_COLOURS[1], ORANGE)  # open, stick, slip
+OPEN_COLOUR, CONTACT_COLOUR = "#F2F0E9", "#12355B"
+STATE_COLOURS = (OPEN_COLOUR, CONTACT_COLOUR, RED)  # open, contact, yielded
+SLIP_COLOURS = (OPEN_COLOUR, CONTACT_COLOUR, ORANGE)  # open, stick, slip
 HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
 # the lightest colours of the map cannot be read on white, the darkest not on black
 SEQUENCE_ENDS = {"light": (0.0, 0.86), "dark": (0.3, 1.0)}
@@ -54,7 +55,8 @@ MOST_CURVES = 6  # in a panel: more cross each other, and their nulls or theorie
 # lines of the first, second ... of several kinds of curves; long dashes stay apart where curves are steep
 LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")
 # what stands beside the curves of a figure is narrower than they are: nulls, references, theories
-DASHED, DOTTED, DASH_DOTTED = ({"ls": line, "lw": 0.9} for line in LINES[1:])
+THIN = 0.9  # points, beside curves of 1.5 and a grid of .6
+DASHED, DOTTED, DASH_DOTTED = ({"ls": line, "lw": THIN} for line in LINES[1:])
 LOG_AXIS_RATIO = 30.0  # an axis is logarithmic when largest / smallest value exceeds this
 NARROW_DECADES = 120.0  # up to two decades, with margins, have room for 1, 2 and 5 of each on a panel
 
