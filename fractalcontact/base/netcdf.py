@@ -16,9 +16,9 @@ import os
 import platform
 import shutil
 import threading
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -81,48 +81,83 @@ def save(result: xr.DataArray | xr.Dataset | xr.DataTree, path: str | os.PathLik
             problems.require(name.endswith(".nc"), "path", "a name that ends in '.nc'", name)
         is_labelled = isinstance(result, (xr.DataArray, xr.Dataset, xr.DataTree))
         problems.require(is_labelled, "result", "a DataArray, Dataset or DataTree", type(result).__name__)
-    return save_with(result, Path(path), ())
+    target = Path(path)
+    with GrowingFile(target) as file:
+        file.add(result)
+    return target
 
 
-def save_with(
-    result: xr.DataArray | xr.Dataset | xr.DataTree, target: Path, more: Iterable[tuple[str, xr.Dataset]]
-) -> Path:
-    """Write a result, and further groups as they come, with one of those in memory at a time; see `save`."""
-    where = SAVE
-    groups = _as_file(result)
-    with Problems(where) as problems:
-        for name, dataset in groups.items():
-            _check_words(problems, name, dataset)
+class GrowingFile:
+    """A NetCDF file to which groups are added as they come; it gets its name when it is complete.
+
+    It stays open: a file that is opened anew reads the headers of all its groups, and the last of 200 groups
+    of 512 x 512 points took .15 s in place of .06 s.
+    """
+
+    def __init__(self, target: Path) -> None:
+        self.target, self.stack = target, contextlib.ExitStack()
+
+    def __enter__(self) -> GrowingFile:
+        import netCDF4
+
+        with _writing(self.target):
+            self.target.parent.mkdir(parents=True, exist_ok=True)
+            clear_partial(self.target.parent)
+            self.temporary = self.stack.enter_context(written_whole(self.target))
+            with NETCDF_LOCK:
+                self.file = netCDF4.Dataset(self.temporary, "w", format="NETCDF4")
+            self.stack.push(self._close)
+        return self
+
+    def add(self, result: xr.DataArray | xr.Dataset | xr.DataTree) -> None:
+        """Write a result, see `save`; its names and attributes are checked first."""
+        groups = _as_file(result)
+        with Problems(SAVE) as problems:
+            for name, dataset in groups.items():
+                _check_words(problems, name, dataset)
+        with _writing(self.target):
+            _write(groups, self.file)
+
+    def add_group(self, name: str, dataset: xr.Dataset) -> None:
+        """Write a group of another file."""
+        with _writing(self.target):
+            _write({name: dataset}, self.file)
+
+    def __exit__(self, *error: Any) -> None:
+        with _writing(self.target):
+            self.stack.__exit__(*error)
+
+    def _close(self, kind: type[BaseException] | None, *_: Any) -> None:
+        with NETCDF_LOCK:
+            self.file.close()
+        if kind is None:
+            append_checksum(self.temporary)
+
+
+@contextlib.contextmanager
+def _writing(target: Path) -> Iterator[None]:
+    """Raise `InvalidInput` for what a file cannot hold, and where it cannot be written."""
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        clear_partial(target.parent)
-        with written_whole(target) as temporary:
-            _write(groups, temporary, "w")
-            for name, dataset in more:
-                _write({name: dataset}, temporary, "a")
-            append_checksum(temporary)
+        yield
     except (TypeError, ValueError, AttributeError) as error:  # the last of netCDF4, for attributes
+        if isinstance(error, InvalidInput):
+            raise
         expected = "names, values and attributes that a NetCDF file can hold"
-        raise InvalidInput(where, [f"result: expected {expected}, got: {error}"]) from error
+        raise InvalidInput(SAVE, [f"result: expected {expected}, got: {error}"]) from error
     except (OSError, RuntimeError) as error:  # netCDF4 reports a full disk as a RuntimeError
         reason = _failure_reason(target.parent, error)
-        raise InvalidInput(where, [f"path: {target.name!r} cannot be written here: {reason}"]) from error
-    return target
+        raise InvalidInput(SAVE, [f"path: {target.name!r} cannot be written here: {reason}"]) from error
 
 
 def replace_attributes(path: Path, attributes: Mapping[str, str]) -> None:
     """Replace global attributes of a file, in a copy that takes its place when it is complete."""
     import netCDF4
 
-    try:
-        with written_whole(path) as copy:
-            shutil.copyfile(path, copy)
-            with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
-                file.setncatts(dict(attributes))
-            append_checksum(copy)
-    except (OSError, RuntimeError) as error:
-        reason = _failure_reason(path.parent, error)
-        raise InvalidInput(SAVE, [f"path: {path.name!r} cannot be written here: {reason}"]) from error
+    with _writing(path), written_whole(path) as copy:
+        shutil.copyfile(path, copy)
+        with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
+            file.setncatts(dict(attributes))
+        append_checksum(copy)
 
 
 def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
@@ -176,7 +211,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
     for node in tree.subtree:
-        node.dataset = with_load_indexes(encoded(_with_fixed_width_strings(node.to_dataset(inherit=False))))
+        node.dataset = _as_saved(node.to_dataset(inherit=False))
     saved_type = tree.attrs.get(_TYPE, "DataTree" if tree.children else "Dataset")
     if saved_type == "DataTree":
         return tree
@@ -235,37 +270,30 @@ class _WaitingArrays:
         self.arrays.append((source, target))
 
 
-def _write(groups: Mapping[str, xr.Dataset], path: Path, mode: Literal["w", "a"]) -> None:
-    """Write groups to a file, new for the mode "w": all names, dims and attributes first, then the arrays.
+def _write(groups: Mapping[str, xr.Dataset], file: Any) -> None:
+    """Write groups to an open file: all names, dims and attributes first, then the arrays.
 
     Blocks of dask arrays are computed and written one by one, each under the lock.
     """
-    import netCDF4
     from xarray.backends import NetCDF4DataStore
     from xarray.backends.common import ArrayWriter
 
     waiting = _WaitingArrays()
-    with NETCDF_LOCK:
-        file = netCDF4.Dataset(path, mode, format="NETCDF4")
-    try:
-        for name, dataset in groups.items():
-            for variable in dataset.variables.values():
-                if variable.chunks is None:
-                    variable.load()  # a lazy array of another file needs the lock of xarray
-            with NETCDF_LOCK:
-                store = NetCDF4DataStore(file, group=name, mode=mode, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
-                dataset.dump_to_store(store, writer=waiting)
-        writer = ArrayWriter()  # type: ignore[no-untyped-call]
-        for source, target in waiting.arrays:
-            writer.add(source, target)  # type: ignore[no-untyped-call]
-        writer.sync()  # type: ignore[no-untyped-call]
-    finally:
+    for name, dataset in groups.items():
+        for variable in dataset.variables.values():
+            if variable.chunks is None:
+                variable.load()  # a lazy array of another file needs the lock of xarray
         with NETCDF_LOCK:
-            file.close()
+            store = NetCDF4DataStore(file, group=name, mode="a", lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
+            dataset.dump_to_store(store, writer=waiting)
+    writer = ArrayWriter()  # type: ignore[no-untyped-call]
+    for source, target in waiting.arrays:
+        writer.add(source, target)  # type: ignore[no-untyped-call]
+    writer.sync()  # type: ignore[no-untyped-call]
 
 
-def _read(path: Path) -> dict[str, xr.Dataset]:
-    """Return the groups of a file in memory."""
+def _read(path: Path, dims: frozenset[str] = frozenset()) -> dict[str, xr.Dataset]:
+    """Return the groups of a file in memory, with the variables over all these dims."""
     import netCDF4
     from xarray.backends import NetCDF4DataStore
 
@@ -279,7 +307,9 @@ def _read(path: Path) -> dict[str, xr.Dataset]:
         for group in _groups(file):
             store = NetCDF4DataStore(file, group=group.path, lock=False)  # type: ignore[no-untyped-call]
             # `open_dataset` would import every library on this machine that adds a file format to xarray
-            groups[group.path] = xr.decode_cf(store).load()
+            stored = xr.decode_cf(store)
+            chosen = [name for name, variable in stored.data_vars.items() if dims <= set(variable.dims)]
+            groups[group.path] = (stored[chosen] if dims else stored).load()
             groups[group.path].set_close(None)
     return groups
 
@@ -344,6 +374,16 @@ def _failure_reason(folder: Path, error: Exception) -> str:
             return "no space left on the device"
     reason = getattr(error, "strerror", None) or str(error)
     return reason if isinstance(error, OSError) else f"the file could not be completed ({reason})"
+
+
+def groups_over(path: Path, dims: frozenset[str]) -> dict[str, xr.Dataset]:
+    """Return the groups of a file that have variables over all these dims, with these alone."""
+    return {name: _as_saved(dataset) for name, dataset in _read(path, dims).items() if dataset.data_vars}
+
+
+def _as_saved(dataset: xr.Dataset) -> xr.Dataset:
+    """Return what was read with the types, encoding and indexes that it had when it was written."""
+    return with_load_indexes(encoded(_with_fixed_width_strings(dataset)))
 
 
 def _with_fixed_width_strings(dataset: xr.Dataset) -> xr.Dataset:

@@ -31,7 +31,7 @@ from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, pictured, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
 from fractalcontact.scenes._scan_files import scans_of
-from fractalcontact.scenes._scans import ScanStudies
+from fractalcontact.scenes._scans import PARTIAL, ScanStudies
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Ensemble, Study
@@ -39,7 +39,6 @@ from fractalcontact.scenes._summary import Summary, screen_text, summary_of, ver
 from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import implausible_result, validate, warn
 
-PARTIAL = "partial: "  # start of the attribute `completeness`
 OWN_REFERENCES = "see the references of each group"
 # what the root of a result states of its groups, for a reader that opens no group
 MAIN = {
@@ -162,15 +161,16 @@ def _run_scans(
             return tree, whole
     with locked(folder), signals.noted() as stop:
         studies = ScanStudies(scans, folder)
-        studies.run(_study_scan, workers, stop, progress=progress)
-        if stop:
-            done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
-            raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
-        groups = studies.groups()
-        tree = _assemble(scene, groups, studies.seconds, [], pooled(groups[OVERVIEW]))
-        _note_run_time(tree, start)
-        tree.attrs["caveats"] = "none"
-        netcdf.save_with(tree, folder / RESULT, studies.maps())
+        with netcdf.GrowingFile(folder / RESULT) as together:
+            studies.run(_study_scan, together, workers, stop, progress=progress)
+            if stop:
+                done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
+                raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
+            groups = studies.groups()
+            tree = _assemble(scene, groups, studies.seconds, [], pooled(groups[OVERVIEW]))
+            _note_run_time(tree, start)
+            tree.attrs["caveats"] = "none"
+            together.add(tree)
         with _beside_the_result():
             frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
             with netcdf.written_whole(folder / _results_folder.CSV) as temporary:
@@ -187,8 +187,8 @@ def _run_scans(
         return tree, whole
 
 
-def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[str, str]) -> str:
-    """Study one scan in a folder of its own; return which stages failed and why.
+def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[str, str]) -> xr.DataTree:
+    """Study one scan in a folder of its own; `completeness` of the result states which stages failed and why.
 
     It is not validated beforehand: what does not fit this scan fails in its stage, and the others go on.
     """
@@ -198,8 +198,7 @@ def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[s
         check_memory(scene, stages_of(scene))
         folder.mkdir(exist_ok=True)
         with locked(folder):
-            tree, _ = _run(scene, folder, False, None, start, stop, facts)
-    return str(tree.attrs.get("completeness", "")).removeprefix(PARTIAL)
+            return _run(scene, folder, False, None, start, stop, facts)[0]
 
 
 def _run(

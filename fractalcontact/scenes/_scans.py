@@ -15,6 +15,7 @@ import xarray as xr
 
 from fractalcontact.base import signals
 from fractalcontact.base.errors import FractalContactError
+from fractalcontact.base.netcdf import GrowingFile, groups_over
 from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.netcdf_header import read_headers
 from fractalcontact.base.output_folder import RESULT
@@ -34,7 +35,8 @@ from fractalcontact.scenes._tables import MAP_DIMS
 DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
 NO_ACCESS = "the worker does not see the folder of the results"
 
-StudyOne = Callable[[Scene, Path, signals.Stop, Mapping[str, str]], str]
+PARTIAL = "partial: "  # start of the attribute `completeness`
+StudyOne = Callable[[Scene, Path, signals.Stop, Mapping[str, str]], xr.DataTree]
 Numbers = dict[str, xr.Dataset]
 
 
@@ -55,12 +57,13 @@ class _ScanTask:
             if not self.folder.parent.is_dir():
                 return NO_ACCESS, {}
             digests = Study(self.scene, PartStore(None), progress=False, workers=None).digests
-            digest, reason = digest_of([digests, self.scene.want.figures]), ""
-            if not _is_finished(self.folder, digest):
-                for name in (RESULT, REPORT):
-                    (self.folder / name).unlink(missing_ok=True)
-                reason = self.study(self.scene, self.folder, stop, {DIGEST: digest})
-            return reason, _numbers(self.folder / RESULT)
+            digest = digest_of([digests, self.scene.want.figures])
+            if _is_finished(self.folder, digest):
+                return "", _numbers(open_result(self.folder / RESULT))
+            for name in (RESULT, REPORT):
+                (self.folder / name).unlink(missing_ok=True)
+            tree = self.study(self.scene, self.folder, stop, {DIGEST: digest})
+            return str(tree.attrs.get("completeness", "")).removeprefix(PARTIAL), _numbers(tree)
         except signals.Stopped:
             return None
         except Exception as error:  # whatever it is, the other scans go on, and the table states it
@@ -76,9 +79,9 @@ def _is_finished(folder: Path, digest: str) -> bool:
         return False
 
 
-def _numbers(path: Path) -> Numbers:
+def _numbers(tree: xr.DataTree) -> Numbers:
     """Return the groups of a result without its maps."""
-    groups = {node.path.strip("/"): node.to_dataset(inherit=False) for node in open_result(path).subtree}
+    groups = {node.path.strip("/"): node.to_dataset(inherit=False) for node in tree.subtree}
     return {name: data.drop_dims(MAP_DIMS, errors="ignore") for name, data in groups.items()}
 
 
@@ -99,23 +102,49 @@ class ScanStudies:
     reasons: dict[str, str] = field(default_factory=dict)
     numbers: dict[str, Numbers] = field(default_factory=dict)
 
-    def run(self, study: StudyOne, workers: Workers | None, stop: signals.Stop, *, progress: bool) -> None:
-        """Study the scans that are not finished; each failure is a reason."""
+    def run(
+        self,
+        study: StudyOne,
+        file: GrowingFile,
+        workers: Workers | None,
+        stop: signals.Stop,
+        *,
+        progress: bool,
+    ) -> None:
+        """Study the scans that are not finished; each failure is a reason.
+
+        The maps of a scan are written to the file of all as soon as those of the scans before it are: this
+        process has time for it while workers study the next ones.
+        """
         names = list(self.scans)
         (self.folder / SCANS).mkdir(exist_ok=True)
         tasks = {
-            number: _ScanTask(self.scans[name], self.folder / SCANS / folder_of(name), study)
-            for number, name in enumerate(names)
+            name: _ScanTask(scene, self.folder / SCANS / folder_of(name), study)
+            for name, scene in self.scans.items()
         }
         # of formats with two bytes for each point, the smallest
-        points = max((file.stat().st_size // 2 for file in self._sources()), default=0)
+        points = max((source.stat().st_size // 2 for source in self._sources()), default=0)
         finished = run_tasks(tasks, PartStore(self.folder), stop, workers, points=points)
-        bar = track(finished, progress, SCANS, unit=SCAN, total=len(names))
-        for number, (reason, numbers) in sorted(bar, key=lambda entry: entry[0]):
-            is_here = (tasks[number].folder / RESULT).is_file()
-            self.reasons[names[number]] = NO_ACCESS if numbers and not is_here else reason
-            if numbers and is_here:
-                self.numbers[names[number]] = numbers
+        found: dict[str, tuple[str, Numbers]] = {}
+        for name, result in track(finished, progress, SCANS, unit=SCAN, total=len(names)):
+            found[name] = result
+            while len(self.reasons) < len(names) and names[len(self.reasons)] in found:
+                self._add(names[len(self.reasons)], *found.pop(names[len(self.reasons)]), file)
+        for name in found:  # behind one that a stop left out
+            self._add(name, *found[name], file)
+
+    def _add(self, name: str, reason: str, numbers: Numbers, file: GrowingFile) -> None:
+        """Note the result of a scan, and write its maps."""
+        result = self.folder / SCANS / folder_of(name) / RESULT
+        if not numbers or not result.is_file():
+            self.reasons[name] = NO_ACCESS if numbers else reason
+            return
+        if not self.numbers:  # the groups of all scans come before those of each
+            for path in (OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars)):
+                file.add_group(f"/{path}", xr.Dataset())
+        self.reasons[name], self.numbers[name] = reason, numbers
+        for path, maps in groups_over(result, MAP_DIMS).items():
+            file.add_group(f"/{SCANS}/{result.parent.name}{path}", maps)
 
     def _sources(self) -> Iterator[Path]:
         for scene in self.scans.values():
@@ -136,15 +165,6 @@ class ScanStudies:
             for stage, facts in provenance_of(groups[""]).get("stages", {}).items():
                 total[stage] = total.get(stage, 0.0) + float(facts["run_time"])
         return total
-
-    def maps(self) -> Iterator[tuple[str, xr.Dataset]]:
-        """Yield the maps of every scan, by their group; one scan is in memory at a time."""
-        for name in self.numbers:
-            for node in open_result(self.folder / SCANS / folder_of(name) / RESULT).subtree:
-                data = node.to_dataset(inherit=False)
-                maps = [key for key, each in data.data_vars.items() if set(each.dims) >= MAP_DIMS]
-                if maps:
-                    yield f"/{SCANS}/{folder_of(name)}{node.path}", data[maps]
 
     def groups(self) -> Numbers:
         """Return the numbers of all scans along `scan`, and the overview."""
