@@ -191,13 +191,31 @@ def surface_faults(
     surface: Any,
     argument: str,
     *,
-    finite: bool,
-    smallest: int,
-    leading: bool,
-    profile: bool,
+    finite: bool = True,
+    smallest: int = 3,
+    leading: bool = False,
+    profile: bool = False,
     decades: int = DECADES,
 ) -> Iterator[Fault]:
-    """Yield what keeps an array from being a surface; `Problems.surface` explains the options."""
+    """Yield what keeps an array from being a surface, heights in metres on a uniform grid.
+
+    Parameters
+    ----------
+    surface : DataArray
+        Dims (..., y, x), or (..., x) where `profile` allows one.
+    argument : str
+        Its name in messages.
+    finite : bool
+        Refuse NaN and infinite heights.
+    smallest : int
+        Smallest number of points along each axis.
+    leading : bool
+        Allow dims before (y, x).
+    profile : bool
+        Allow a profile, dims (..., x) without y.
+    decades : int
+        Allowed powers of ten of a metre, up and down, for heights and their range.
+    """
     if not isinstance(surface, xr.DataArray):
         expected = "a DataArray of heights (see fractalcontact.surfaces.from_array)"
         yield argument, expected, type(surface).__name__

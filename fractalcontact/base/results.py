@@ -43,7 +43,7 @@ from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp, with_load_indexes
 from fractalcontact.base.references import NO_REFERENCES
 from fractalcontact.base.schema import STOP_REASONS, label
-from fractalcontact.base.surface_argument import with_surface
+from fractalcontact.base.surface_argument import SPACING, SURFACE, usual_arguments
 from fractalcontact.base.validation import Problems, did_you_mean
 
 MASKS = ("mask", "masks", "valid")
@@ -111,7 +111,10 @@ def public_result(
         # no word is true: what is declared as a flag is True or False
         flags = sorted(word for word, given in signature.parameters.items() if given.annotation == "bool")
 
-        def checked(*arguments: Any, **options: Any) -> inspect.BoundArguments:
+        takes_spacing = SURFACE in signature.parameters and SPACING not in signature.parameters
+
+        def checked(arguments: Any, options: dict[str, Any]) -> tuple[inspect.BoundArguments, str]:
+            spacing = options.pop(SPACING, None) if takes_spacing else None
             try:
                 bound = signature.bind(*arguments, **options)
             except TypeError as cause:
@@ -122,6 +125,7 @@ def public_result(
                 ]
                 raise TypeError(f"{name}: {'; '.join(hints) or cause}") from None
             bound.apply_defaults()
+            done = usual_arguments(name, bound.arguments, spacing)
             bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
             if not in_blocks and (loaded := loaded_bytes(bound.arguments)):
                 require_memory(name, loaded, _size_of(bound.arguments))
@@ -133,14 +137,13 @@ def public_result(
             needed = peak_of(memory, bound.arguments, in_blocks=in_blocks)
             if needed > NEGLIGIBLE:
                 require_memory(name, needed, _size_of(bound.arguments))
-            return bound
+            return bound, done
 
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
             with _memory_errors(name):
-                given, words, notes = with_surface(name, signature, arguments, options)
-                bound = checked(*given, **words)
+                bound, done = checked(arguments, options)
                 if not in_blocks:
                     announce_loading(name, bound.arguments)
                 result = function(*bound.args, **bound.kwargs)
@@ -158,14 +161,13 @@ def public_result(
             result = label(result, keep_notes=True)
             give_reasons(result, reasons)
             result = stamp(result, name, parameters, **entries)
-            if notes:
-                result.attrs["history"] += f" (surface: {notes})"
+            if done:
+                result.attrs["history"] += f" (surface: {done})"
             return with_load_indexes(result)
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
             with _memory_errors(name):
-                given, words, _ = with_surface(name, signature, arguments, options)
-                checked(*given, **words)
+                checked(arguments, options)
 
         public = cast("PublicFunction[P, R]", call)
         public.validate = validate  # type: ignore[method-assign]

@@ -7,9 +7,7 @@ said in the `history` of the result.
 
 from __future__ import annotations
 
-import inspect
 import warnings
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -26,42 +24,19 @@ MASK_DIMS = ("step", "y", "x")  # of a plain array; of one row of cells (x,)
 WIDE = 20.0  # m: a surface without units that is wider may be in millimetres
 
 
-def with_surface(
-    where: str, signature: inspect.Signature, arguments: tuple[Any, ...], options: Mapping[str, Any]
-) -> tuple[tuple[Any, ...], dict[str, Any], str]:
-    """Return the arguments of a call with its surface in the usual form, and what was done to it.
+def usual_arguments(where: str, arguments: dict[str, Any], spacing: Any = None) -> str:
+    """Bring surface and masks among the arguments of a call into the usual form, in place.
 
-    Parameters
-    ----------
-    where : str
-        Public name of the function.
-    signature : Signature
-        That of the function; nothing is done where it has no argument `surface`, or it has a `spacing`.
+    Return what was done to the surface; `spacing` is that of a plain array. A function with an argument
+    `spacing` of its own takes any array as its surface.
     """
-    names = signature.parameters
-    if MASK in names:
-        arguments = (
-            tuple(
-                labelled_mask(value) if name in (MASK, VALID) else value
-                for name, value in zip(names, arguments, strict=False)
-            )
-            + arguments[len(names) :]
-        )
-        options = {
-            word: labelled_mask(value) if word in (MASK, VALID) else value for word, value in options.items()
-        }
-    if SURFACE not in names or SPACING in names:
-        return arguments, dict(options), ""
-    place, words = list(names).index(SURFACE), dict(options)
-    value = arguments[place] if place < len(arguments) else words.get(SURFACE)
-    spacing = words.pop(SPACING, None)
-    surface, notes = usual_form(where, value, spacing)
-    if surface is not value:
-        if place < len(arguments):
-            arguments = (*arguments[:place], surface, *arguments[place + 1 :])
-        else:
-            words[SURFACE] = surface
-    return arguments, words, ", ".join(notes)
+    for name in (MASK, VALID) if MASK in arguments else ():
+        if name in arguments:
+            arguments[name] = labelled_mask(arguments[name])
+    if SURFACE not in arguments or SPACING in arguments:
+        return ""
+    arguments[SURFACE], notes = usual_form(where, arguments[SURFACE], spacing)
+    return ", ".join(notes)
 
 
 def labelled_mask(value: Any) -> Any:
@@ -109,7 +84,7 @@ def _warn_of_unit(where: str, value: xr.DataArray, core: tuple[str, ...]) -> Non
                 f"it is in millimetres, set surface.{dim}.attrs['units'] = 'mm' (also of the heights), else "
                 "'m'"
             )
-            warnings.warn(message, ScaleWarning, stacklevel=5)
+            warnings.warn(message, ScaleWarning, stacklevel=6)
             return
 
 

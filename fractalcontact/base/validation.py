@@ -294,48 +294,14 @@ class Problems:
         got = Words(f"{Path(value).name!r}: no permission to read it")
         return self.require(may_read, argument, f"{what} that may be read", got)
 
-    def surface(
-        self,
-        argument: str,
-        value: Any = GIVEN,
-        *,
-        finite: bool = True,
-        smallest: int = 3,
-        leading: bool = False,
-        profile: bool = False,
-        decades: int | None = None,
-    ) -> bool:
+    def surface(self, argument: str, value: Any = GIVEN, **options: Any) -> bool:
         """Check for heights in metres on a uniform grid; `base.grid.read_grid` then reads the grid.
 
-        Parameters
-        ----------
-        argument : str
-            Name of the argument.
-        value : DataArray, optional
-            Dims (..., y, x), or (..., x) where `profile` allows one.
-        finite : bool
-            Refuse NaN and infinite heights.
-        smallest : int
-            Smallest number of points along each axis.
-        leading : bool
-            Allow dims before (y, x).
-        profile : bool
-            Allow a profile, dims (..., x) without y.
-        decades : int, optional
-            Allowed powers of ten of a metre, up and down, for heights and their range.
+        The options are those of `base.grid.surface_faults`.
         """
-        from fractalcontact.base.grid import DECADES, surface_faults  # loads xarray
+        from fractalcontact.base.grid import surface_faults  # loads xarray
 
-        faults = surface_faults(
-            self._value(argument, value),
-            argument,
-            finite=finite,
-            smallest=smallest,
-            leading=leading,
-            profile=profile,
-            decades=DECADES if decades is None else decades,
-        )
-        return self._add_all(faults)
+        return self._add_all(surface_faults(self._value(argument, value), argument, **options))
 
     def grid(self, argument: str, value: Any = GIVEN, *, dims: Sequence[str] = ("y", "x")) -> bool:
         """Check that `dims` are the last dims of a DataArray and have uniform coordinates in metres."""
