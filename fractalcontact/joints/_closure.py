@@ -19,6 +19,7 @@ from fractalcontact.joints._sheared_contact import (
     PRESSING_BYTES,
     Pressing,
     check_pressing,
+    over_directions,
     press_sheared,
     pressed_dataset,
 )
@@ -114,7 +115,7 @@ def closure(
     solver = (influence, disc_radius, hardness, tolerance, method)
     pressing = Pressing.read(crack, WHERE, loads, solver, bulk=bulk, keep=keep)
     pressed = [press_sheared(pressing, shears, towards, progress) for towards in directions]
-    result = pressed_dataset(pressing, shears, directions, pressed)
+    result = pressed_dataset(pressing, shears, directions, over_directions(pressing, pressed))
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
     if is_single(direction):
         result = result.isel(direction=0)

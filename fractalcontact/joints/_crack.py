@@ -333,16 +333,17 @@ def check_elastic(problems: Problems, crack: Crack) -> bool:
     return all(given)
 
 
-def check_sliding(problems: Problems, *, single: bool = False) -> bool:
+def check_sliding(problems: Problems, *, single: bool = False, has_slid: bool = False) -> bool:
     """Check crack, shears (m, each once) and directions, and that the block stays on its face.
 
-    With `single` there is one direction, not a sequence of them.
+    With `single` there is one direction, not a sequence of them; with `has_slid` no shear is zero.
     """
     crack, shear, direction = problems.given.crack, problems.given.shear, problems.given.direction
+    bounds: dict[str, Any] = {"above": 0} if has_slid else {"at_least": 0}
     valid = [
         check_crack(problems),
         check_direction(problems) if single else check_directions(problems),
-        problems.numbers("shear", at_least=0),
+        problems.numbers("shear", **bounds),
     ]
     if not valid[2]:
         return False

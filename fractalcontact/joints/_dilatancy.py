@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import COMPASS, Direction, direction_coords, read_directions
-from fractalcontact.base.numbers import Array, float_array, number_of_entries
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
@@ -24,6 +23,8 @@ from fractalcontact.joints._sheared_contact import (
     Pressing,
     check_pressed,
     check_pressing,
+    check_unpressed,
+    over_directions,
     press_against_spring,
     press_sheared,
     pressed_dataset,
@@ -36,7 +37,7 @@ def _check(problems: Problems) -> None:
     given = problems.given
     check_sliding(problems)
     if given.normal_force is None:
-        _check_defaults(problems)
+        check_unpressed(problems, dilatancy, ("normal_stiffness", "pressed", "bulk", "keep", *SOLVER))
         return
     check_pressed(problems)
     one_of = given.normal_stiffness is None or given.pressed is None
@@ -45,17 +46,6 @@ def _check(problems: Problems) -> None:
     check_pressing(problems)
     problems.choices("keep", among=CONTACT_MAPS, optional=True)
     problems.choice("bulk", among=BULK)
-
-
-def _check_defaults(problems: Problems) -> None:
-    """Check that the options of a press have their defaults, where nothing is pressed."""
-    parameters = inspect.signature(dilatancy).parameters
-    for name in ("normal_stiffness", "pressed", "bulk", "keep", *SOLVER):
-        value, default = getattr(problems.given, name), parameters[name].default
-        unused = value is default or (isinstance(value, type(default)) and value == default)
-        if name == "keep":
-            unused = value is None or number_of_entries(value) == 0
-        problems.require(unused, name, "nothing without a force: rigid faces are not pressed")
 
 
 @public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESSING_BYTES)
@@ -147,7 +137,8 @@ def dilatancy(
             columns = press_against_spring(pressing, shears, lifted, towards, stiffness, progress)
         by_direction.append(columns)
     has_spring = normal_stiffness is not None
-    under_force = pressed_dataset(pressing, shears, directions, by_direction, has_spring=has_spring)
+    pressed_columns = over_directions(pressing, by_direction)
+    under_force = pressed_dataset(pressing, shears, directions, pressed_columns, has_spring=has_spring)
     under_force = under_force.reset_coords("closure").drop_vars(("contact_area", "run_time"))
     result = under_force.merge(rigid, compat="override", combine_attrs="override")
     result["dilatancy"] = result["rigid_dilatancy"] - result["interface_closure"]
@@ -160,11 +151,8 @@ def dilatancy(
 
 
 def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction]) -> xr.Dataset:
-    layout = crack.layout
-    lower, upper = crack.faces()
-    initial = separations(lower, upper, layout, np.zeros(1), (0.0, 1.0))[0]
-    lifted = np.stack([_separations(crack, shears, towards) for towards in directions]) - initial
-    slope_y, slope_x = mean_slopes(lower, layout)
+    lifted, initial = rigid_dilatancies(crack, shears, directions, WHERE)
+    slope_y, slope_x = mean_slopes(crack.faces()[0], crack.layout)
     mean_slope = np.array([slope_y * towards.unit[0] + slope_x * towards.unit[1] for towards in directions])
     dims = ("direction", "shear")
     return xr.Dataset(
@@ -181,11 +169,17 @@ def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction])
     )
 
 
-def _separations(crack: Crack, shears: Array, towards: Direction) -> Array:
-    highest = separations(*crack.faces(), crack.layout, shears, towards.unit)
-    if not np.isfinite(highest).all():
-        raise missing_heights(WHERE, crack, towards, float(shears[~np.isfinite(highest)][0]))
-    return highest
+def rigid_dilatancies(
+    crack: Crack, shears: Array, directions: Sequence[Direction], where: str
+) -> tuple[Array, float]:
+    """Return the rigid dilatancy, shape (direction, shear), and the separation that it counts from, m."""
+    initial = separations(*crack.faces(), crack.layout, np.zeros(1), (0.0, 1.0))[0]
+    highest = np.empty((len(directions), shears.size))
+    for row, towards in zip(highest, directions, strict=True):
+        row[:] = separations(*crack.faces(), crack.layout, shears, towards.unit)
+        if not np.isfinite(row).all():
+            raise missing_heights(where, crack, towards, float(shears[~np.isfinite(row)][0]))
+    return highest - initial, float(initial)
 
 
 def separations(lower: Array, upper: Array, block: Block, shears: Array, unit: Pair) -> Array:

@@ -9,18 +9,27 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import COMPASS
+from fractalcontact.base.compass import COMPASS, direction_coords, read_directions
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.power_law import fit_line
+from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._crack import Crack
+from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import POSITIVE
-from fractalcontact.joints._dilatancy import dilatancy
+from fractalcontact.joints._dilatancy import rigid_dilatancies
 from fractalcontact.joints._friction import LOCKED, LOCKED_ANGLE
+from fractalcontact.joints._sheared_contact import (
+    PRESSING_BYTES,
+    Pressing,
+    check_pressing,
+    check_unpressed,
+    over_directions,
+    press_sheared,
+)
 
-FROM_DILATANCY = ("dilatancy", "residual", "converged", "rms_slope", "basic_friction_angle", "nominal_area")
-FROM_RIGID = ("rigid_dilatancy", "basic_friction_angle", "nominal_area")
+WHERE = "fractalcontact.joints.self_weight"
+OF_SOLVER = ("influence", "hardness", "tolerance")
 MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
 RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and no load closes it"
 NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
@@ -29,25 +38,25 @@ NO_EXPONENT = "NaN for a single size, and where a strength is missing or not pos
 def _check(problems: Problems) -> None:
     given = problems.given
     weight = problems.number("unit_weight", **POSITIVE)
-    # any shear and force, to check the other arguments as well
-    shear = given.shear if problems.numbers("shear", above=0) else 0.0
-    force: Any = 1.0
+    check_sliding(problems, has_slid=True)
+    force: Any = 1.0  # any, to check the other arguments as well
     if problems.numbers("structure_size", **POSITIVE):
         sizes = float_array(given.structure_size)
         ascending = bool((np.diff(sizes) > 0).all())
         problems.require(ascending, "structure_size", "ascending sizes, each once")
         if weight and isinstance(given.crack, Crack):
             force = (float(given.unit_weight) * sizes * given.crack.nominal_area).tolist()
-    loads = {} if _is_rigid(given.crack) else {"normal_force": force}
-    solver = {name: getattr(given, name) for name in ("influence", "hardness", "tolerance")}
-    with problems.collect():
-        dilatancy.validate(given.crack, shear=shear, direction=given.direction, **loads, **solver)
+    if _is_rigid(given.crack):
+        check_unpressed(problems, self_weight, OF_SOLVER)
+    else:
+        check_pressing(problems, normal_force=force)
 
 
 @public_result(
     title="shear strength of a joint under self-weight",
     reasons={"shear_strength": LOCKED, "strength_exponent": NO_EXPONENT},
     check=_check,
+    memory=PRESSING_BYTES,
 )
 def self_weight(
     crack: Crack,
@@ -120,43 +129,42 @@ def self_weight(
     ... )
     ([[[0.24, 2.4]]], [[1.0]])
     """
-    sizes, shears = float_array(structure_size), float_array(shear)
-    pressures = float(unit_weight) * sizes
-    solver = {"influence": influence, "hardness": hardness, "tolerance": tolerance}
-    slid, result = _slid(crack, shears, direction, pressures, solver)
-    result = result.assign_coords(structure_size=sizes)
-    result = result.assign_coords(nominal_pressure=("structure_size", pressures))
-    opening = result["dilatancy"]
-    angle = crack.basic_friction_angle + np.degrees(np.arctan(opening.values / shears[:, None]))
+    sizes, shears, directions = float_array(structure_size), float_array(shear), read_directions(direction)
+    pressures, dims = float(unit_weight) * sizes, ("direction", "shear", "structure_size")
+    lifted, _ = rigid_dilatancies(crack, shears, directions, WHERE)
+    opening = np.repeat(lifted[..., None], sizes.size, axis=-1)
+    variables: dict[str, Any] = {}
+    attributes: dict[str, Any] = {"references": PAPER}
+    if not _is_rigid(crack):
+        forces = {"normal_force": pressures * crack.nominal_area}
+        pressing = Pressing.read(crack, WHERE, forces, (influence, "second_order", hardness, tolerance))
+        pressed = [press_sheared(pressing, shears, towards, False) for towards in directions]
+        columns = over_directions(pressing, pressed)
+        opening -= columns["interface_closure"]
+        for name in ("residual", "converged", "rms_slope"):
+            variables[name] = dims[: columns[name].ndim], columns[name]
+        attributes = {
+            "references": pressing.references,
+            "achieved_residual": float(columns["residual"].max()),
+        }
+    angle = crack.basic_friction_angle + np.degrees(np.arctan(opening / shears[:, None]))
     strength = pressures * np.tan(np.radians(np.where(angle < LOCKED_ANGLE, angle, math.nan)))
-    result["friction_angle"], result["shear_strength"] = (opening.dims, angle), (opening.dims, strength)
     exponents = [_exponent(sizes, row) for row in strength.reshape(-1, sizes.size)]
-    result["strength_exponent"] = opening.dims[:-1], np.reshape(exponents, opening.shape[:-1])
-    result["friction_angle"].attrs["comment"] = MEAN_ANGLE
-    if _is_rigid(crack):
-        result["shear_strength"].attrs["comment"] = RIGID_FACES
-    if "residual" in result:
-        result.attrs["achieved_residual"] = float(result["residual"].max())
-    return result.assign_attrs(references=slid.attrs["references"])
+    variables |= {
+        "dilatancy": (dims, opening),
+        "friction_angle": (dims, angle, {"comment": MEAN_ANGLE}),
+        "shear_strength": (dims, strength, {"comment": RIGID_FACES} if _is_rigid(crack) else {}),
+        "strength_exponent": (dims[:-1], np.reshape(exponents, lifted.shape)),
+        "basic_friction_angle": crack.basic_friction_angle,
+        "nominal_area": crack.nominal_area,
+    }
+    coords = {"structure_size": sizes, "nominal_pressure": ("structure_size", pressures)}
+    coords |= {"shear": ("shear", shears), **direction_coords(directions)}
+    return xr.Dataset(variables, coords, attributes)
 
 
 def _is_rigid(crack: Any) -> bool:
     return isinstance(crack, Crack) and crack.young is None and crack.poisson is None
-
-
-def _slid(
-    crack: Crack, shears: Array, direction: Any, pressures: Array, solver: dict[str, Any]
-) -> tuple[xr.Dataset, xr.Dataset]:
-    """Return the result of `dilatancy` and what is kept of it, over (direction, shear, structure_size)."""
-    if _is_rigid(crack):
-        slid = dilatancy(crack, shear=shears, direction=direction)
-        kept = slid[list(FROM_RIGID)].rename(rigid_dilatancy="dilatancy").drop_attrs()
-        repeated = kept["dilatancy"].expand_dims(structure_size=pressures.size, axis=-1).copy()
-        return slid, kept.assign(dilatancy=repeated)
-    force = (pressures * crack.nominal_area).tolist()
-    slid = dilatancy(crack, shear=shears, direction=direction, normal_force=force, **solver)
-    kept = slid[list(FROM_DILATANCY)].drop_vars(("step", "normal_force", "nominal_pressure"))
-    return slid, kept.drop_attrs().rename(step="structure_size")
 
 
 def _exponent(sizes: Array, strengths: Array) -> float:

@@ -11,7 +11,8 @@ imported where it is called: a study of rigid faces loads neither it nor the com
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -136,6 +137,17 @@ def check_pressing(problems: Problems, **replaced: Any) -> LoadPath | None:
         check_elastic(problems, crack)
         options.check_load(load, crack.nominal_area, problems)
     return load
+
+
+def check_unpressed(problems: Problems, function: Callable[..., object], names: Sequence[str]) -> None:
+    """Check that options of a press have the defaults of the function, where nothing is pressed."""
+    parameters = inspect.signature(function).parameters
+    for name in names:
+        value, default = getattr(problems.given, name), parameters[name].default
+        unused = value is default or (isinstance(value, type(default)) and value == default)
+        if name == "keep":
+            unused = value is None or number_of_entries(value) == 0
+        problems.require(unused, name, "nothing without a force: rigid faces are not pressed")
 
 
 def _boundary(crack: Crack) -> str:
@@ -328,25 +340,29 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     return columns | {"rms_slope": at_load["rms_slope"].values}
 
 
+def over_directions(pressing: Pressing, pressed: Sequence[Columns]) -> Columns:
+    """Return columns with the direction as first axis; warn the caller's caller of steep delta-surfaces."""
+    from fractalcontact.contact import solver
+
+    stacked = {name: np.stack([columns[name] for columns in pressed]) for name in pressed[0]}
+    what, slope = f"{pressing.where}: the delta-surface", float(stacked["rms_slope"].max())
+    solver.warn_steep(what, slope, stacklevel=5)
+    return stacked
+
+
 def pressed_dataset(
     pressing: Pressing,
     shears: Array,
     directions: Sequence[Direction],
-    pressed: Sequence[Columns],
+    stacked: Columns,
     *,
     has_spring: bool = False,
 ) -> xr.Dataset:
-    """Return the columns of all directions over (direction, shear, step), and maps over (..., y, x).
+    """Return columns over (direction, shear, step), and maps over (..., y, x).
 
-    Warns of steep delta-surfaces. Without a spring the prescribed load is the same at every shear, and a
-    coordinate of `step` alone.
+    Without a spring the prescribed load is the same at every shear, and a coordinate of `step` alone.
     """
-    from fractalcontact.contact import solver
-
     crack, load = pressing.crack, pressing.load
-    stacked = {name: np.stack([columns[name] for columns in pressed]) for name in pressed[0]}
-    what, slope = f"{pressing.where}: the delta-surface", float(stacked["rms_slope"].max())
-    solver.warn_steep(what, slope, stacklevel=5)
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in stacked.items()}
     coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}

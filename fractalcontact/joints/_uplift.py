@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -419,8 +418,14 @@ def _balanced(
     """
     from scipy.optimize import brentq
 
-    @lru_cache(maxsize=4)  # the search asks again for the two steps that enclose the balance, and for its end
+    solved: dict[float, State] = {}  # the search asks again for the steps that enclose the balance
+
     def state(place: float) -> State:
+        if place not in solved:
+            solved[place] = solve(place)
+        return solved[place]
+
+    def solve(place: float) -> State:
         step = min(int(place), len(stresses) - 2)
         share, (low, high) = place - step, stresses[step : step + 2]
         stress = low * (high / low) ** share if low > 0 else share * high
@@ -438,8 +443,8 @@ def _balanced(
         found = state(place)
     if found.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
         root = brentq(lambda at: state(at).balance_error, place, place + 1, xtol=PLACE_ERROR)
-        return state(root)._replace(iterations=state.cache_info().misses)
-    found = found._replace(iterations=state.cache_info().misses)
+        return state(root)._replace(iterations=len(solved))
+    found = found._replace(iterations=len(solved))
     if found.converged:
         return found
     return found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
