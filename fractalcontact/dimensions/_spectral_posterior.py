@@ -568,60 +568,34 @@ def _maxima(
                     if totals[d] < totals[start]:
                         start = d
                 totals[start] = math.inf
-                for i in range(p):
-                    u[i] = starts[start, i] if math.isnan(held[i]) else 0.0
-                if k > 0 and _misfit(
-                    before,
-                    fixed[m],
-                    prior,
-                    form,
-                    axes,
-                    table,
-                    nodes,
-                    t,
-                    white,
-                    lnq,
-                    level,
-                    white_k,
-                    values,
-                    model,
-                    residual,
-                ) < _misfit(
-                    u,
-                    fixed[m],
-                    prior,
-                    form,
-                    axes,
-                    table,
-                    nodes,
-                    t,
-                    white,
-                    lnq,
-                    level,
-                    white_k,
-                    values,
-                    model,
-                    residual,
-                ):
-                    _copy(before, u)
-                damping = 0.0
-                objective = _misfit(
-                    u,
-                    fixed[m],
-                    prior,
-                    form,
-                    axes,
-                    table,
-                    nodes,
-                    t,
-                    white,
-                    lnq,
-                    level,
-                    white_k,
-                    values,
-                    model,
-                    residual,
-                )
+                damping, objective = 0.0, math.inf
+                for attempt in range(2 if k > 0 else 1):
+                    for i in range(p):
+                        trial[i] = starts[start, i] if math.isnan(held[i]) else 0.0
+                    if attempt == 1:
+                        _copy(before, trial)
+                    total = _misfit(
+                        trial,
+                        held,
+                        prior,
+                        form,
+                        axes,
+                        table,
+                        nodes,
+                        t,
+                        white,
+                        lnq,
+                        level,
+                        white_k,
+                        values,
+                        shifted,
+                        trial_residual,
+                    )
+                    if attempt == 0 or total < objective:
+                        objective = total
+                        _copy(trial, u)
+                        _copy(shifted, model)
+                        _copy(trial_residual, residual)
                 for _step in range(_STEPS):
                     for i in range(p):
                         for b in range(bins):
@@ -652,7 +626,7 @@ def _maxima(
                             trial[i] = u[i] + move[i] * (0.7 / longest)
                         total = _misfit(
                             trial,
-                            fixed[m],
+                            held,
                             prior,
                             form,
                             axes,
