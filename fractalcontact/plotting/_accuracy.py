@@ -175,7 +175,7 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
         case = data.isel(family=i, size=j)
         for ax, (name, (title, ideal)) in zip(column, QUANTITIES.items(), strict=True):
             panel = _draw_against_hurst(ax, case, name, title, methods)
-            panel.level(ideal, color=_style.ink(), lw=0.9, ls=":")
+            panel.level(ideal, color=_style.ink(), **_style.DOTTED)
             is_last = name == "error_ratio" and ax is shown[0, -1]
             panel.finish(log="y" if name == "error_ratio" else "", legend=is_last)
             if ax is not shown[list(QUANTITIES).index(name), 0]:
@@ -186,19 +186,15 @@ def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
 
 
 def _draw_against_hurst(ax: Axes, case: xr.Dataset, name: str, title: str, methods: Family) -> LinePanel:
-    dims = ("method", "hurst")
-    hurst, values = (
-        quantity(case, "hurst", ("hurst",), "true Hurst exponent"),
-        quantity(case, name, dims, title),
-    )
-    panel = LinePanel(ax, hurst, values, methods)
-    for i, own in enumerate(methods.styles):
-        finite = np.isfinite(values.values[i])
-        if not finite.any():
-            continue
-        panel.line(methods.labels[i], hurst.values[finite], values.values[i][finite], **own)
-        if {f"{name}_low", f"{name}_high"} <= case.variables.keys():
-            ends = (table(case, f"{name}_{end}", dims)[i][finite] for end in ("low", "high"))
-            label = f"{methods.labels[i]}, interval"
-            panel.bars(label, hurst.values[finite], *ends, color=own["color"], lw=0.8)
+    hurst, dims = "true Hurst exponent", ("method", "hurst")
+    panel = LinePanel.of(ax, case, "hurst", name, dims, methods, x_name=hurst, y_name=title)
+    ends = panel.interval(name)
+    for i, (method, own) in enumerate(zip(methods.labels, methods.styles, strict=True)):
+        finite = np.isfinite(panel.y.values[i])
+        x = panel.x.values[i, finite]
+        if finite.any():
+            panel.line(method, x, panel.y.values[i, finite], **own)
+            if ends:
+                bars = (end[i, finite] for end in ends)
+                panel.bars(f"{method}, interval", x, *bars, color=own["color"], lw=_style.THIN)
     return panel

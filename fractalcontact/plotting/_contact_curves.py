@@ -153,8 +153,8 @@ def path(
     for name, rows, line in zip(names, values, cycle(_style.LINES), strict=False):
         title = name_of(data[name])
         panel.curves(title, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
-        if len(rows) == 1 and {f"{name}_low", f"{name}_high"} <= data.variables.keys():
-            low, high = (panel.values(f"{name}_{end}")[0] for end in ("low", "high"))
+        if len(rows) == 1 and (ends := panel.interval(name)):
+            low, high = (end[0] for end in ends)
             panel.band(f"{title}, interval", x.values[0], low, high, family.styles[0]["color"])
     if theory is not None:
         _draw_theories(panel, theory, OF_THEORY.get(names[0], names[0]), against or _paths.load_of(data))

@@ -255,7 +255,7 @@ def dimensions(
         panel.area_key(band_name, facecolor=_style.pale())
         panel.ax.axvspan(*band, color=_style.pale(), lw=0, zorder=0)
     if truth is not None:
-        panel.place(truth, key="true", color=_style.ink(), lw=0.9, ls=":")
+        panel.place(truth, key="true", color=_style.ink(), **_style.DOTTED)
     low_end, high_end = panel.ax.get_xlim()
     wider = max(NARROW - (high_end - low_end), 0.0) / 2
     panel.ax.set_xlim(low_end - wider, high_end + wider)

@@ -115,6 +115,11 @@ class LinePanel:
         """Return a variable of the result, one row for each of the family."""
         return table(self.data, name, self.dims)
 
+    def interval(self, name: str) -> tuple[Array, ...]:
+        """Return the lower and the upper ends of a variable of the result; none where it has no interval."""
+        ends = (f"{name}_low", f"{name}_high")
+        return tuple(map(self.values, ends)) if set(ends) <= self.data.variables.keys() else ()
+
     def curves(self, what: str, y: Any = None, x: Any = None, *, key: str = "", **style: Any) -> None:
         """Draw one curve for each of the family: y has its rows, x has them or is common.
 

@@ -11,8 +11,9 @@ from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import result_of
+from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._style import AxesArray, Panels
-from fractalcontact.plotting._units import Units, scale_of
+from fractalcontact.plotting._units import PLAIN, Quantity, Units
 
 SCAN = "scan"
 FIRST = {
@@ -61,23 +62,23 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
 
 
 def _draw_distribution(ax: Any, data: Any, name: str) -> None:
-    values = data[name]
-    order = np.argsort(values.values)[: int(np.isfinite(values).sum())]
-    scale, rank = scale_of(values), np.arange(order.size)
-    x = scale(values.values[order])
-    if {f"{name}_low", f"{name}_high"} <= set(data.variables):
-        low, high = (scale(data[f"{name}_{end}"].values[order]) for end in ("low", "high"))
-        ax.hlines(rank, low, high, color=_style.BLUE, lw=0.8, alpha=0.6)
-    far = is_far(values.values)[order]
-    ax.plot(x[~far], rank[~far], "o", ms=3, color=_style.BLUE)
-    ax.plot(x[far], rank[far], "o", ms=4, color=_style.RED)
-    ax.axvline(np.median(x), color=_style.grey(), ls="--", lw=0.8)
+    title = FIRST.get(name, str(data[name].attrs.get("long_name", name)).partition(":")[0])
+    data = data.isel({SCAN: np.argsort(data[name].values)[: int(np.isfinite(data[name]).sum())]})
+    rank = np.arange(data.sizes[SCAN])
+    panel = LinePanel.of(ax, data, name, Quantity(rank, PLAIN, ""), (SCAN,), x_name=title)
+    x, far = panel.x.values, is_far(panel.x.values)
+    if ends := panel.interval(name):
+        lines = {"color": _style.BLUE, "lw": _style.THIN, "alpha": 0.6, "label": "interval"}
+        ax.hlines(rank, *map(panel.x.scale, ends), **lines)
+    panel.line("scan", x[~far], rank[~far], ls="", marker="o", ms=3, color=_style.BLUE)
+    panel.line("outlier", x[far], rank[far], ls="", marker="o", color=_style.RED)
+    panel.place(float(np.median(x)), color=_style.grey(), **_style.DASHED)
     for place in np.flatnonzero(far)[: _style.MAX_LEGEND_ENTRIES]:
-        is_left = x[place] < np.mean(ax.get_xlim())
+        shown = panel.x.shown[place]
+        is_left = shown < np.mean(ax.get_xlim())
         ax.annotate(
-            str(data[SCAN].values[order[place]]), (x[place], rank[place]), fontsize="x-small",
+            str(data[SCAN].values[place]), (shown, rank[place]), fontsize="x-small",
             xytext=(5 if is_left else -5, 0), textcoords="offset points", va="center",
             ha="left" if is_left else "right",
         )  # fmt: skip
-    ax.set_xlabel(scale.label(FIRST.get(name, str(values.attrs.get("long_name", name)).partition(":")[0])))
     ax.set_yticks([])

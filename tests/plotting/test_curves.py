@@ -77,6 +77,22 @@ def test_intervals_and_bands_have_both_ends():
     assert band.max() == pytest.approx(float(result["window_ci_high"]))
 
 
+def test_scans_are_sorted_with_intervals_and_outliers():
+    heights = np.array([2e-6, 1e-6, np.nan, 3e-6, 9e-5, 2.5e-6, 4e-6])
+    columns = {"rms_height": heights, "rms_height_low": heights / 2, "rms_height_high": heights * 2}
+    overview = xr.Dataset(
+        {name: ("scan", values, {"units": "m"}) for name, values in columns.items()},
+        {"scan": [f"{letter}.sur" for letter in "abcdefg"]},
+    )
+    (ax,) = plotting.scans(overview, units={"rms_height": "um"})
+    assert ax.xaxis.get_units() == "µm"
+    numbers = plotting.curves(ax).groupby("curve")["x"].apply(list)
+    assert np.allclose(numbers["scan"], [1, 2, 2.5, 3, 4])
+    assert np.allclose(numbers["outlier"], [90])
+    assert np.allclose(numbers["interval"][:4], [0.5, 2, 1, 4])
+    assert [text.get_text() for text in ax.texts] == ["e.sur"]
+
+
 def test_csv_beside_the_figures(study, tmp_path):
     tree = xr.DataTree.from_dict({"/joints/closure": study["joints/closure"].to_dataset()})
     files = plotting.draw(tree, tmp_path, formats=["png", "csv"], units={"normal_force": "N"})
