@@ -19,7 +19,7 @@ from fractalcontact.base.threads import in_bands, thread_count
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-SMALL = 1 << 16  # elements up to which a transform is a single call of ducc0
+SMALL = 1 << 16  # elements up to which a transform is a single call of ducc0: too few for two threads
 GROUP = 16  # lines: a multiple of the number that ducc0 transforms together
 # bytes of the rows that are copied and transformed at a time: 2^14 to 2^22 take the same time within 2 % at
 # 1024 and 2048 points, 2^14 takes 8 % longer at 256

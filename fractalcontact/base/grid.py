@@ -18,7 +18,9 @@ import xarray as xr
 from fractalcontact.base.memory import has_blocks
 from fractalcontact.base.numbers import is_real
 
-UNIFORM = 1e-6  # largest distance of a centre from its place on a uniform axis, in spacings
+# largest distance of a centre from its place on a uniform axis, in spacings: a height is then off by 1e-6 of
+# its increment
+UNIFORM = 1e-6
 DECADES = 100  # squares and cubes of lengths between 1e-100 and 1e100 m can be represented
 # share of a cell by which each edge of `contact_edges` makes the counted area too large (Yastrebov, Anciaux
 # and Molinari 2017)

@@ -23,7 +23,7 @@ from fractalcontact.base.errors import TooLittleMemory, UnreadableFile
 from fractalcontact.base.threads import openblas_threads
 
 NEGLIGIBLE = 1 << 25  # bytes that a call takes without a look at the limits, which takes .5 ms
-SMALL_FILE = 1 << 28  # bytes that any file may unpack to
+SMALL_FILE = 1 << 28  # bytes that any file may unpack to: about what the libraries take (`LIBRARIES`)
 # bytes that NumPy, SciPy, Numba and matplotlib take as they are loaded, as `ulimit -v` (address space) and
 # `ulimit -d` (data) count them. OpenBLAS, of which NumPy and SciPy have a copy each, takes more for every
 # further thread; where that does not fit, it ends the process or tries for ever.

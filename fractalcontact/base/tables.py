@@ -13,7 +13,7 @@ from tabulate import tabulate
 
 WIDTH = 110  # where the output is no terminal
 WORD = 24  # characters: a longer word may be broken
-GAP = 2  # between columns
+GAP = 2  # spaces that tabulate puts between columns
 GLUE = "\N{NO-BREAK SPACE}"  # between number and unit while cells are wrapped
 # the spaces of a quantity; where these make a table too wide, it may break before its ±
 QUANTITY = (r"(?<=\d) (?=[±µ%°A-Za-z])|(?<=±) ", r"(?<=\d) (?=[µ%°A-Za-z])|(?<=±) ")

@@ -39,7 +39,7 @@ ROUGHNESS = ("roughness_coefficient", "directional_roughness")
 GROUPS = (
     "strength_envelope", "direct_shear", "shear_curve", "closure", "closure_laws", "transmissivity",
 )  # fmt: skip
-MOST_SHEARS = 4  # with a line about their closure
+MOST_SHEARS = 4  # with a line about their closure: what the column has room for beside all else
 
 
 @checked

@@ -17,8 +17,8 @@ from fractalcontact.plotting._units import Quantity
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Styles = Sequence[dict[str, Any]]
-LEGEND_WIDTH = 24  # characters
-BAND_OPACITY = 0.14  # of an interval under its curve: several of them stay transparent
+LEGEND_WIDTH = 24  # characters: of the size of legends 1.35 inches, a quarter of a panel with its legend
+BAND_OPACITY = 0.14  # of an interval under its curve: five on top of each other hide half of what is below
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ from fractalcontact.plotting._units import Quantity, Units, label_axis, name_of,
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-MOST_CELLS = 1600  # along an edge; a finer plane is averaged first, since no screen shows more
+MOST_CELLS = 1600  # along an edge, a finer plane is averaged first: a map in a file has 700 points
 SHADED_SLOPE = 0.5  # rms slope after the exaggeration of the shading
 SHADING = 0.9  # change of brightness from no light to full light
 CLIPPED = 0.2  # per cent of the values at either end that may lie outside the colour bar
 CLIPPED_POSITIVE = 1.0  # the same of pressures and gaps, whose tails are longer
 TAIL = 0.25  # a tail that adds less than this share of the range is shown, one that adds more is cut
-PALETTE = 12  # colours of neighbouring islands
+PALETTE = 12  # colours of neighbouring islands, which are told apart by a step of five
 STATES = {
     "state": (("open", "contact", "yielded"), _style.STATE_COLOURS),
     "slip_state": (("open", "stick", "slip"), _style.SLIP_COLOURS),

@@ -16,7 +16,7 @@ from fractalcontact.plotting._style import spread_indices
 from fractalcontact.plotting._units import PLAIN, Quantity, Units, name_of, number_texts, scale_of, shown_in
 
 PATH = ("shear", "step")
-SAME = 5e-3  # loads with a smaller relative difference count as equal
+SAME = 5e-3  # relative difference of equal loads: half a unit of the third digit, the last that a label has
 LOADS = {"tangential_force": "$Q$", "normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
 
@@ -166,7 +166,7 @@ def loaded_steps(path: xr.Dataset, most: int) -> list[int]:
     return sorted({int(steps[nearest(closure, target)]) for target in targets})
 
 
-JUMP = 4.0  # ratio of successive shears at which the evenly sampled part of a curve ends
+JUMP = 4.0  # ratio of successive shears at which the evenly sampled part ends: a series by octaves has 2
 NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 
 

@@ -28,7 +28,7 @@ from fractalcontact.plotting._units import Quantity, Units
 SIZES = ("box_length", "radius_length", "side", "box_size", "radius")
 IN_CELLS = ("box_size", "radius")
 CELLS = Scale(1.0, "cells")  # where a mask has no lengths
-TOLERANCE = 0.1  # of a local dimension beyond 0 or 2
+TOLERANCE = 0.1  # beyond 0 or 2, up to which a local dimension is not mentioned: twice the margin of the axes
 STEEP = 1.5  # ratio of values above which the lacunarity is drawn on a logarithmic axis
 SPOTS = "random spots, equal area, number and perimeter"
 CELLS_NULL = "random null, equal coverage"

@@ -57,7 +57,8 @@ LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")
 # what stands beside the curves of a figure is narrower than they are: nulls, references, theories
 THIN = 0.9  # points, beside curves of 1.5 and a grid of .6
 DASHED, DOTTED, DASH_DOTTED = ({"ls": line, "lw": THIN} for line in LINES[1:])
-LOG_AXIS_RATIO = 30.0  # an axis is logarithmic when largest / smallest value exceeds this
+# largest / smallest value beyond which an axis is logarithmic: on a linear one of 3 inches 1/30 is 2.5 mm
+LOG_AXIS_RATIO = 30.0
 NARROW_DECADES = 120.0  # up to two decades, with margins, have room for 1, 2 and 5 of each on a panel
 
 _for_files: ContextVar[bool] = ContextVar("figures for files", default=False)

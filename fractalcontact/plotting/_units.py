@@ -53,7 +53,7 @@ OWN_NAME = frozenset(
         "pair_correlation_length",
     }
 )  # fmt: skip
-LONGEST_LABEL = 44  # characters of a line, which fits beside a panel of usual height
+LONGEST_LABEL = 44  # characters of a line: of 9 points 2.9 inches, the height of a panel in a row
 PLAIN = Scale(1.0, "")  # of a number without a unit
 PER_CENT = Scale(0.01, "%")  # of a share
 PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
