@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions import _spectral_sectors as sectors
@@ -65,7 +65,8 @@ _FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into
 
 
 def _check(problems: Problems) -> None:
-    problems.numbers("azimuth", optional=True)
+    if problems.given.direction is not None:
+        check_directions(problems)
     is_valid = check_surface(problems, smallest=SMALLEST, profile=False, reserved=_NAMES)
     check_scales(problems, is_valid=is_valid)
 
@@ -78,7 +79,7 @@ def _check(problems: Problems) -> None:
 )
 def directions(
     surface: xr.DataArray,
-    azimuth: float | Sequence[float] | None = None,
+    direction: str | float | Sequence[str | float] | None = None,
     *,
     scales: tuple[float, float] | None = None,
 ) -> xr.Dataset:
@@ -88,9 +89,9 @@ def directions(
     ----------
     surface : DataArray
         Heights in m, dims (..., y, x), at least 16 points along each axis. NaN marks missing points.
-    azimuth : float or sequence of float, optional
-        Degrees anticlockwise from E, modulo 180; on free edges the nearest lattice directions are used.
-        Default: eight over the half-circle.
+    direction : str, float, or a sequence of them, optional
+        Compass words, or degrees anticlockwise from E, modulo 180; on free edges the nearest lattice
+        directions are used. Default: eight over the half-circle.
     scales : (low, high), optional
         Lengths in m: lags on free edges, wavelengths on periodic ones and for the tests. Default: the
         shortest lags that all directions have, or the band of the spectrum.
@@ -126,7 +127,7 @@ def directions(
     --------
     >>> import fractalcontact as fc
     >>> ground = fc.surfaces.spectral(
-    ...     (128, 128), 1e-4, hurst=0.7, rms_height=1e-6, anisotropy_ratio=2.0, azimuth=30.0, rng=1
+    ...     (128, 128), 1e-4, hurst=0.7, rms_height=1e-6, anisotropy_ratio=2.0, direction=30.0, rng=1
     ... )
     >>> result = fc.dimensions.directions(ground)
     >>> print(
@@ -136,7 +137,9 @@ def directions(
     """
     surfaces = read_surfaces(surface)
     window = surfaces[0].resolved(read_scales(scales))
-    chosen = None if azimuth is None else np.unique(np.mod(float_array(azimuth), 180.0))
+    chosen = None
+    if direction is not None:
+        chosen = np.unique([towards.azimuth % 180.0 for towards in read_directions(direction)])
     is_periodic = all(surfaces[0].grid.periodic) and all(single.is_complete for single in surfaces)
     if is_periodic:
         azimuths = np.arange(DIRECTIONS) * 180.0 / DIRECTIONS if chosen is None else chosen

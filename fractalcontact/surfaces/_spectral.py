@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
+from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
@@ -41,7 +42,7 @@ def _check(problems: Problems) -> None:
     if valid_plane and all(valid_cutoffs):
         _check_order(problems)
     problems.choice("normalise", among=("realisation", "expectation"))
-    problems.number("azimuth")
+    check_direction(problems)
     if problems.number("anisotropy_ratio", at_least=1e-6, at_most=1e6):
         one_exponent = not valid_hurst or len(set(float_array(given.hurst))) == 1
         isotropic = float(given.anisotropy_ratio) == 1.0
@@ -52,7 +53,7 @@ def _check(problems: Problems) -> None:
         sizes = given.members or 1, *_new_surface.axis_sizes(given.shape)
         _new_surface.check_memory(problems.where, sizes)  # before a look at all the modes
         band = _Band.of(
-            given.shape, given.spacing, given.hurst, cutoffs, given.anisotropy_ratio, given.azimuth
+            given.shape, given.spacing, given.hurst, cutoffs, given.anisotropy_ratio, given.direction
         )
         _check_modes(problems, band, given.shape, given.spacing)
 
@@ -90,7 +91,7 @@ def spectral(
     short_cutoff: float | None = None,
     normalise: str = "realisation",
     anisotropy_ratio: float = 1.0,
-    azimuth: float = 0.0,
+    direction: str | float = "E",
     members: int | None = None,
     rng: RNGLike = None,
 ) -> xr.DataArray:
@@ -115,9 +116,10 @@ def spectral(
         plateau.
     normalise : {"realisation", "expectation"}
         Whether this surface has the rms value, to rounding, or the expectation over all surfaces.
-    anisotropy_ratio, azimuth : float
-        Correlations are `anisotropy_ratio` times as long along `azimuth` (degree, E = 0, anticlockwise) as
-        across it; only with one exponent. The cut-offs are those of the isotropic surface.
+    anisotropy_ratio, direction : float, and str or float
+        Correlations are `anisotropy_ratio` times as long along `direction` (a compass word, or degrees
+        anticlockwise from E) as across it; only with one exponent. The cut-offs are those of the isotropic
+        surface.
     members : int, optional
         Number of independent surfaces, along a dim `member`. Member i is the same for any number of them.
     rng : None, int, SeedSequence, BitGenerator or Generator
@@ -153,7 +155,7 @@ def spectral(
     of_slope, expected = target == "rms_slope", normalise == "expectation"
     unit = _length_unit(steps)
     cutoffs = {"long_cutoff": long_cutoff, "rolloff": rolloff, "short_cutoff": short_cutoff}
-    band = _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, azimuth)
+    band = _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, direction)
     ny, nx = (1, *sizes)[-2:]
     dy, dx = ((1.0, *steps)[-2] / unit, steps[-1] / unit)
 
@@ -258,7 +260,7 @@ class _Band:
         hurst: Any,
         cutoffs: dict[str, float | None],
         anisotropy_ratio: float,
-        azimuth: float,
+        direction: str | float,
     ) -> _Band:
         """Return the band of a surface, with wavenumbers in rad per `_length_unit`."""
         sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
@@ -274,7 +276,7 @@ class _Band:
             corner,
             high,
             float(anisotropy_ratio),
-            math.radians(float(azimuth)),
+            math.radians(read_direction(direction).azimuth),
             len(sizes),
         )
 

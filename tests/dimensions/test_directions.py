@@ -20,7 +20,7 @@ def anisotropic(n, seed, anisotropy_ratio=2.0, azimuth=30.0, hurst=0.6, thin=4, 
     """Anisotropic fractal with free edges: every fourth point of a quarter of a periodic surface."""
     complete = fc.surfaces.spectral(
         (2 * thin * n, 2 * thin * n), SPACING / thin, hurst=hurst, rms_height=1e-6,
-        anisotropy_ratio=anisotropy_ratio, azimuth=azimuth, rng=seed, **options,
+        anisotropy_ratio=anisotropy_ratio, direction=azimuth, rng=seed, **options,
     )  # fmt: skip
     return fc.surfaces.from_array(complete.values[: thin * n : thin, : thin * n : thin], SPACING)
 
@@ -63,7 +63,7 @@ def test_ratio_and_azimuth_recovered(free):
         surface = anisotropic(192, 3)
     else:
         surface = fc.surfaces.spectral(
-            (192, 192), SPACING, hurst=0.6, rms_height=1e-6, anisotropy_ratio=2.0, azimuth=30.0, rng=3
+            (192, 192), SPACING, hurst=0.6, rms_height=1e-6, anisotropy_ratio=2.0, direction=30.0, rng=3
         )
     result = fc.dimensions.directions(surface)
     assert float(result["isotropy_p_value"]) < 1e-6

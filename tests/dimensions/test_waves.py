@@ -82,7 +82,7 @@ def blurred(seed):
 
 def anisotropic(seed):
     return fc.surfaces.spectral(
-        (160, 160), SPACING, hurst=0.7, rms_height=STEP, anisotropy_ratio=4.0, azimuth=30.0, rng=seed
+        (160, 160), SPACING, hurst=0.7, rms_height=STEP, anisotropy_ratio=4.0, direction=30.0, rng=seed
     ).values[:128, :128]
 
 
@@ -107,7 +107,7 @@ def test_band_limited_surface_has_no_wave(ratio):
     for seed in range(6):
         surface = fc.surfaces.spectral(
             (128, 128), SPACING, hurst=0.7, rms_height=STEP, rolloff=30 * SPACING, short_cutoff=5 * SPACING,
-            anisotropy_ratio=ratio, azimuth=30.0, rng=seed,
+            anisotropy_ratio=ratio, direction=30.0, rng=seed,
         )  # fmt: skip
         assert fc.dimensions.waves(surface).sizes["wave"] == 0
 

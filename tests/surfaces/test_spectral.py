@@ -78,7 +78,7 @@ def test_every_mode_has_its_density(covariance_of, shape, band):
     wavenumbers = {"long_cutoff": "low", "rolloff": "corner", "short_cutoff": "high"}
     options = {name: 2 * np.pi / band[wave] for name, wave in wavenumbers.items() if wave in band}
     if "azimuth" in band:
-        options |= {"anisotropy_ratio": band["anisotropy_ratio"], "azimuth": np.rad2deg(band["azimuth"])}
+        options |= {"anisotropy_ratio": band["anisotropy_ratio"], "direction": np.rad2deg(band["azimuth"])}
     covariance = covariance_of(
         lambda rng: spectral(shape, spacing, band["hurst"], rng, normalise="expectation", **options).values
     ).reshape(*shape, *shape)
@@ -170,12 +170,14 @@ def test_closed_form_moments_agree_with_the_sum_over_modes(hurst, rolloff):
 
 def test_anisotropy_lengthens_along_its_azimuth():
     surface = spectral(
-        (128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, azimuth=0.0
+        (128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, direction=0.0
     )
     slope = fc.surfaces.describe(surface)
     assert float(slope.rms_slope_y / slope.rms_slope_x) > 2.0
     turned = fc.surfaces.describe(
-        spectral((128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, azimuth=90.0)
+        spectral(
+            (128, 128), 1.0, hurst=0.8, rms_height=1.0, rolloff=32.0, anisotropy_ratio=4.0, direction=90.0
+        )
     )
     assert float(turned.rms_slope_x / turned.rms_slope_y) > 2.0
 

@@ -16,7 +16,13 @@ import fractalcontact as fc
 def cut_surface(anisotropy_ratio):
     """Return every fourth point of a part of a surface: not periodic, without short cut-off."""
     large = fc.surfaces.spectral(
-        (1024, 1024), 1e-5, hurst=0.7, rms_height=2e-5, anisotropy_ratio=anisotropy_ratio, azimuth=30.0, rng=1
+        (1024, 1024),
+        1e-5,
+        hurst=0.7,
+        rms_height=2e-5,
+        anisotropy_ratio=anisotropy_ratio,
+        direction=30.0,
+        rng=1,
     )
     return fc.surfaces.from_array(large.values[:800:4, :800:4], 4e-5)
 
