@@ -124,9 +124,6 @@ def path(
         `fractalcontact.domains.evolution`.
     variable : str or sequence of str
         Name of the variable, or of several of one unit, which get a line style each.
-    against : str, optional
-        Variable on the x axis: nominal_pressure, normal_force, closure or shear. Default: the first of the
-        loads that the result has, or shear where it has a single step.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
     log : bool, optional
@@ -240,8 +237,6 @@ def area_dimension(
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.area_dimension`.
-    shear : float, optional
-        Shear (m), the nearest one is drawn; None: the middle one.
     {shared}
 
     Examples

@@ -41,8 +41,6 @@ def dilatancy(
         mean_slope over direction; with forces dilatancy (m) over (direction, shear, step).
     direction : str or float, optional
         Direction to draw: a word or degrees anticlockwise from E. Required with forces if there are several.
-    reach : float, optional
-        Largest shear displacement (m) to show.
     marked : sequence of float
         Shear displacements (m) to mark A, B, C ... on the curve of the last force.
     {shared}

@@ -246,8 +246,6 @@ def first_contact(
     result : Dataset or node of a DataTree
         Variable `state` with dims (shear, step, y, x), or without shear, and the load of each step: from
         `fractalcontact.contact.press` or `fractalcontact.joints.closure`.
-    shear : float, optional
-        Shear displacement (m) of the load path; the nearest one is taken. Default: the middle one.
     {shared}
 
     Examples

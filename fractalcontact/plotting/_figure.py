@@ -19,13 +19,26 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Test: TypeAlias = Callable[[Any], bool]
 
-UNITS = """units : mapping of str to str, optional
-    Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix."""
-AX = """ax : Axes, optional
-    Default: those of a new figure."""
-AXES = """axes : array of Axes, Figure or SubFigure, optional
-    The Axes of the panels, or a figure to make them in. Default: a new figure."""
-SHARED = """
+# of options, where the docstring of a figure does not explain them itself
+PARAGRAPHS = {
+    "against": """against : str, optional
+    Variable on the x axis: nominal_pressure, normal_force, closure or shear. Default: the first of the
+    loads that the result has, or shear where it has a single step.""",
+    "shear": """shear : float, optional
+    Shear displacement (m) of the load path; the nearest one is taken. Default: the middle one.""",
+    "normal_force": """normal_force : float, optional
+    Normal force (N) under which states along shear are shown; the nearest step is taken. Default: the last
+    step.""",
+    "reach": """reach : float, optional
+    Largest shear displacement (m) to show.""",
+    "units": """units : mapping of str to str, optional
+    Unit of each variable by name, `{"closure": "mm"}` if the data have it. Default: a suitable prefix.""",
+    "ax": """ax : Axes, optional
+    Default: those of a new figure.""",
+    "axes": """axes : array of Axes, Figure or SubFigure, optional
+    The Axes of the panels, or a figure to make them in. Default: a new figure.""",
+}
+ENDING = """
 Returns
 -------
 {returned}
@@ -53,10 +66,10 @@ def figure(function: Callable[P, R]) -> Callable[P, R]:
             return function(*arguments, **options)
 
     if function.__doc__:
-        returned = "Axes" if "ax" in signature.parameters else "array of Axes"
-        paragraphs = [UNITS] if "units" in signature.parameters else []
-        paragraphs += [AX if returned == "Axes" else AXES, SHARED.replace("{returned}", returned)]
-        wrapper.__doc__ = inspect.cleandoc(function.__doc__).replace("{shared}", "\n".join(paragraphs))
+        text = inspect.cleandoc(function.__doc__)
+        names = [name for name in PARAGRAPHS if name in signature.parameters and f"\n{name} :" not in text]
+        ending = ENDING.replace("{returned}", "Axes" if "ax" in names else "array of Axes")
+        wrapper.__doc__ = text.replace("{shared}", "\n".join([*(PARAGRAPHS[name] for name in names), ending]))
     return wrapper
 
 

@@ -123,9 +123,6 @@ def lineage(
     result : Dataset or node of a DataTree
         From `fractalcontact.domains.evolution`: n_islands, births and absorbed (or merges) over (shear,
         step), or over one of them.
-    against : str, optional
-        Variable on the x axis: nominal_pressure, normal_force, closure or shear. Default: the first of the
-        loads that the result has, or shear where it has a single step.
     {shared}
 
     Examples
@@ -197,8 +194,6 @@ def alluvial(
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.domains.lineage`.
-    shear : float, optional
-        Shear displacement (m) of the load path; the nearest one is taken. Default: the middle one.
     {shared}
 
     Examples

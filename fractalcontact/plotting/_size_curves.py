@@ -63,11 +63,6 @@ def signature(
     result : Dataset or node of a DataTree
         From `fractalcontact.domains.signature`, `box_dimension`, `box_counts`, `correlation_dimension` or
         `minkowski_dimension` over (shear, step), or without shear or step.
-    shear : float, optional
-        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
-        middle one.
-    normal_force : float, optional
-        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
     {shared}
 
     Examples
@@ -147,11 +142,6 @@ def lacunarity(
     ----------
     result : Dataset or node of a DataTree
         From `fractalcontact.domains.lacunarity` over (shear, step, box_size), or without shear or step.
-    shear : float, optional
-        Shear displacement (m) of the panel of increasing load; the nearest one is taken. Default: the
-        middle one.
-    normal_force : float, optional
-        Normal force (N) of the panel of increasing shear; the nearest step is taken. Default: the last step.
     maps : bool
         Draw heat maps instead of curves.
     {shared}
@@ -253,8 +243,6 @@ def box_dimension(
     result : Dataset or node of a DataTree
         From `fractalcontact.domains.box_dimension`, `minkowski_dimension`, `correlation_dimension` or
         `boundary_dimension` over (shear, step), or over one of them.
-    normal_force : float, optional
-        Normal force (N) of the panel against shear; the nearest step is taken. Default: the last step.
     {shared}
 
     Examples

@@ -156,8 +156,6 @@ def friction(
     direction : str, optional
         Direction to draw; required if there are several directions and forces. Without forces each
         direction gets a curve.
-    reach : float, optional
-        Largest shear displacement (m) to show.
     {shared}
 
     Examples
