@@ -373,7 +373,7 @@ def _run(options: argparse.Namespace) -> int:
 
         figures = len(list(out.glob("*.png")))
         size = (out / RESULT).stat().st_size
-        drawn = f" and {figures} figures" if figures else ""
+        drawn = f" and {figures} figure{'s' * (figures > 1)}" if figures else ""
         files = f"{RESULT} ({size / 1e6:.2g} MB), report.html"
         written = f"written to {out}: {files}{drawn}{_memory()}"
         print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
