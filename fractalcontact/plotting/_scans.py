@@ -78,7 +78,8 @@ def _draw_distribution(ax: Any, data: Any, name: str) -> None:
         is_left = shown < np.mean(ax.get_xlim())
         ax.annotate(
             str(data[SCAN].values[place]), (shown, rank[place]), fontsize="x-small",
-            xytext=(5 if is_left else -5, 0), textcoords="offset points", va="center",
+            xytext=(0, 3), textcoords="offset points", va="bottom",  # above the interval
             ha="left" if is_left else "right",
         )  # fmt: skip
     ax.set_yticks([])
+    ax.margins(y=0.08)  # of the name of the highest
