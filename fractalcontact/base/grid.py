@@ -234,7 +234,7 @@ def surface_faults(
         yield argument, "real numbers", f"type {surface.dtype}"
     else:
         if finite:
-            yield from _missing_faults(surface.values, argument)
+            yield from missing_faults(surface.values, argument)
         in_memory = not has_blocks(surface)
         if in_memory:
             yield from _size_faults(surface.values, argument, decades)
@@ -254,12 +254,15 @@ def distinct(values: Array) -> Array:
     return values[tuple(slice(0, 1) if stride == 0 else slice(None) for stride in values.strides)]
 
 
-def _missing_faults(heights: Array, argument: str) -> Iterator[Fault]:
-    heights = distinct(heights)
-    missing = heights.size - int(np.count_nonzero(np.isfinite(heights)))
+def missing_faults(
+    values: Array, argument: str, remedy: str = "see fractalcontact.surfaces.fill"
+) -> Iterator[Fault]:
+    """Yield how many values are not finite, if any."""
+    values = distinct(values)
+    missing = values.size - int(np.count_nonzero(np.isfinite(values)))
     if missing:
-        expected = "finite values (see fractalcontact.surfaces.fill)"
-        yield argument, expected, f"{missing} of {heights.size} NaN or infinite"
+        expected = "finite values" + (f" ({remedy})" if remedy else "")
+        yield argument, expected, f"{missing} of {values.size} NaN or infinite"
 
 
 def _size_faults(heights: Array, argument: str, decades: int) -> Iterator[Fault]:

@@ -183,23 +183,18 @@ def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray) -> None:
         return
     converged = result["converged"]
     failed, shown = np.argwhere(~converged.values), []
-    for index in failed[:PLACES_SHOWN]:
-        at = result.isel(dict(zip(converged.dims, index.tolist(), strict=True)))
-        known = [
-            (dim, at[dim].item() if dim in at.coords else int(i))
-            for dim, i in zip(converged.dims, index, strict=True)
-        ]
-        places = [
-            f"{dim} {value:g}" if isinstance(value, float) else f"{dim} {value}" for dim, value in known
-        ]
+    for index in failed[:PLACES_SHOWN].tolist():
+        where = dict(zip(converged.dims, index, strict=True))
+        at = result.isel(where)
+        values = {dim: at[dim].item() if dim in at.coords else i for dim, i in where.items()}
+        places = [f"{dim} {v:g}" if isinstance(v, float) else f"{dim} {v}" for dim, v in values.items()]
         reason = converged.attrs.get("reason", "")
         if "stop_reason" in at:
             reason = list(STOP_REASONS)[int(at["stop_reason"])]
-        counts = [(unit, at[unit]) for unit in ("transforms", "iterations") if unit in at]
-        work = [f"after {int(count)} {WORK[unit]}" for unit, count in counts[:1]]
-        error = [f"(residual {float(at['residual']):.2g})"] if "residual" in at else []
+        work = next((f"after {int(at[unit])} {words}" for unit, words in WORK.items() if unit in at), "")
+        error = f"(residual {float(at['residual']):.2g})" if "residual" in at else ""
         place = f"{', '.join(places)}: " if places else ""
-        shown.append(place + " ".join(filter(None, [reason, *work, *error])))
+        shown.append(place + " ".join(filter(None, [reason, work, error])))
     more = f"; and {len(failed) - PLACES_SHOWN} more" if len(failed) > PLACES_SHOWN else ""
     warnings.warn(f"{name}: not converged: {'; '.join(shown)}{more}", ConvergenceWarning, stacklevel=3)
 

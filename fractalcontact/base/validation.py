@@ -258,12 +258,9 @@ class Problems:
 
     def finite(self, argument: str, array: xr.DataArray | np.ndarray, *, remedy: str = "") -> bool:
         """Check that all values are finite; otherwise report how many are not."""
-        from fractalcontact.base.grid import distinct  # loads xarray
+        from fractalcontact.base.grid import missing_faults  # loads xarray
 
-        values = distinct(np.asarray(array))
-        missing = values.size - int(np.count_nonzero(np.isfinite(values)))
-        expected = "finite values" + (f" ({remedy})" if remedy else "")
-        return self.require(missing == 0, argument, expected, f"{missing} of {values.size} NaN or infinite")
+        return self._add_all(missing_faults(np.asarray(array), argument, remedy))
 
     def path(self, argument: str, value: Any = GIVEN, *, what: str = "the path of a file") -> bool:
         """Check for the path of a file: text or a `pathlib.Path` that a file system can hold."""
