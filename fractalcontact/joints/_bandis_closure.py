@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import xarray as xr
@@ -26,7 +25,7 @@ def _check(problems: Problems) -> None:
         weakest = float(given.wall_strength) <= float(given.compressive_strength)
         problems.require(weakest, "wall_strength", "at most compressive_strength")
     joint = {name: value for name, value in vars(given).items() if name != "nominal_pressure"}
-    opening, stiffness, closure = _constants(**joint)
+    opening, stiffness, closure = _criteria.bandis_constants(**joint)
     problems.require(
         stiffness > 0 and 0 < closure <= opening,
         "roughness_coefficient, wall_strength, aperture",
@@ -103,7 +102,7 @@ def bandis_closure(
     [36.2, 107.1]
     """
     pressure = float_array(nominal_pressure)
-    opening, stiffness, greatest = _constants(
+    opening, stiffness, greatest = _criteria.bandis_constants(
         roughness_coefficient, wall_strength, compressive_strength, aperture, cycle
     )
     closures = _criteria.hyperbolic_closure(pressure, stiffness, greatest)
@@ -116,20 +115,3 @@ def bandis_closure(
         },
         {"nominal_pressure": pressure},
     )
-
-
-def _constants(
-    roughness_coefficient: float,
-    wall_strength: float,
-    compressive_strength: float | None,
-    aperture: float | None,
-    cycle: int,
-) -> tuple[float, float, float]:
-    """Return aperture under no load, initial stiffness and greatest closure."""
-    jrc, jcs = float(roughness_coefficient), float(wall_strength)
-    ucs = float(compressive_strength or wall_strength)
-    opening = _criteria.bandis_aperture(jrc, jcs, ucs) if aperture is None else float(aperture)
-    if not opening > 0:  # a joint without roughness is closed
-        return opening, math.nan, math.nan
-    stiffness = _criteria.bandis_stiffness(jrc, jcs, opening)
-    return opening, stiffness, _criteria.bandis_greatest_closure(jrc, jcs, opening, int(cycle))

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fractalcontact.base.compass import check_direction
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
 
@@ -50,10 +51,23 @@ MOBILISED = np.array(
 )
 
 
+# of the integral of the dilation: with 400 it changes by up to 3e-4, stresses against a spring too
+FEWEST_STEPS = 200
+
+
 def check_quantities(problems: Problems, *names: str, optional: bool = False) -> None:
     """Check arguments against `BOUNDS`; `optional` allows None."""
     for name in names:
         problems.number(name, **BOUNDS[name], optional=optional)
+
+
+def check_measured(problems: Problems, *measures: Any) -> None:
+    """Check the direction, and the surface, if any, by the checks of what is measured on it."""
+    options = {"direction": problems.given.direction} if check_direction(problems) else {}
+    if problems.given.surface is not None:
+        for measure in measures:
+            with problems.collect():
+                measure.validate(problems.given.surface, **options)
 
 
 @dataclass(frozen=True)
@@ -78,14 +92,16 @@ def scaled_roughness(roughness: Any, length: Any) -> Any:
     return roughness * (length / SAMPLE_LENGTH) ** (-0.02 * roughness)
 
 
-def scaled_wall_strength(wall_strength: float, roughness: float, length: float) -> float:
-    """Return JCS of a longer joint, JCS0 (L/L0)^(-0.03 JRC0) (Barton and Bandis 1982)."""
-    return float(wall_strength * (length / SAMPLE_LENGTH) ** (-0.03 * roughness))
+def longer_joint(roughness: float, wall_strength: float, length: float) -> tuple[float, float, float]:
+    """Return JRC, JCS (Pa) and displacement at the peak (m) of a length (Barton and Bandis 1982).
 
-
-def peak_displacement(roughness: float, length: float) -> float:
-    """Return the shear displacement at the peak, L/500 (JRC/L)^0.33 (Barton and Bandis 1982)."""
-    return float(length / 500.0 * (scaled_roughness(roughness, length) / length) ** 0.33)
+    JCS = JCS0 (L/L0)^(-0.03 JRC0), and the peak is at L/500 (JRC/L)^0.33. A JRC0 that is negative or not
+    known counts as 0.
+    """
+    of_sample = float(np.fmax(roughness, 0.0))
+    scaled = float(scaled_roughness(of_sample, length))
+    strength = float(wall_strength * (length / SAMPLE_LENGTH) ** (-0.03 * of_sample))
+    return scaled, strength, float(length / 500.0 * (scaled / length) ** 0.33)
 
 
 def roughness_angle(pressure: Array, roughness: float, wall_strength: float, residual_angle: float) -> Array:
@@ -108,6 +124,45 @@ def damage_coefficient(pressure: Array, roughness: float, wall_strength: float) 
     with np.errstate(divide="ignore", invalid="ignore"):
         coefficient = np.where(decades > 0, 0.7 + roughness / (12.0 * decades), 2.0)
     return np.clip(coefficient, 1.0, 2.0)
+
+
+def barton_shear(
+    displacement: Array,
+    pressure: Array,
+    joint: tuple[float, float, float],
+    residual_angle: float,
+    damage: float | None,
+    stiffness: float,
+) -> dict[str, Array]:
+    """Return stresses, angles and dilation by mobilised roughness, shape (displacement, pressure).
+
+    `joint` is that of `longer_joint`, `damage` M, None for that of `damage_coefficient`, `stiffness` that of
+    a spring per area, Pa/m. The dilation is the integral of the tangent of its angle.
+    """
+    jrc, jcs, peak = joint
+
+    def angles(place: float, sigma: Array) -> tuple[Array, Array]:
+        """Return the angles of friction and dilation (radian) at a displacement under a normal stress."""
+        peak_angle = roughness_angle(sigma, jrc, jcs, residual_angle)
+        mobilised = mobilised_angle(place / peak, peak_angle, residual_angle)
+        by = damage or damage_coefficient(sigma, jrc, jcs)
+        return np.radians(residual_angle + mobilised), np.radians(np.clip(mobilised, 0.0, None) / by)
+
+    # steps finer than the displacements in between
+    fine = np.union1d(displacement, np.linspace(0.0, displacement[-1], FEWEST_STEPS + 1))
+    sigma, opening, rise = pressure, np.zeros_like(pressure), angles(0.0, pressure)[1]
+    rows, last, before = [], 0.0, rise
+    for place in fine:
+        start = opening
+        for _ in range(2):  # the stress at the end of the step, once corrected
+            friction, rise = angles(place, sigma)
+            opening = start + 0.5 * (np.tan(rise) + np.tan(before)) * (place - last)
+            sigma = pressure + stiffness * opening
+        rows.append((sigma * np.tan(friction), sigma, np.degrees(friction), np.degrees(rise), opening))
+        last, before = place, rise
+    columns = np.array(rows)[np.searchsorted(fine, displacement)].transpose(1, 0, 2)
+    names = ("shear_stress", "normal_stress", "friction_angle", "dilatancy_angle", "dilatancy")
+    return dict(zip(names, columns, strict=True))
 
 
 def patton(pressure: Array, joint: Joint) -> tuple[Array, Array]:
@@ -142,17 +197,21 @@ def barton_choubey(pressure: Array, joint: Joint) -> tuple[Array, Array]:
 
 def barton_bandis(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     """Return the strength of Barton and Choubey with JRC and JCS of the length of the joint."""
-    jrc = float(np.fmax(joint.roughness_coefficient, 0.0))  # 0 where it is negative or not known
-    wall_strength = scaled_wall_strength(joint.wall_strength, jrc, joint.length)
-    return _barton(pressure, joint, scaled_roughness(jrc, joint.length), wall_strength)
+    jrc, jcs, _ = longer_joint(joint.roughness_coefficient, joint.wall_strength, joint.length)
+    return _barton(pressure, joint, jrc, jcs)
 
 
 def _barton(pressure: Array, joint: Joint, roughness: float, wall_strength: float) -> tuple[Array, Array]:
     angle = joint.residual_angle + roughness_angle(pressure, roughness, wall_strength, joint.residual_angle)
-    relative = pressure / wall_strength
-    inside = (relative >= FITTED_STRESS[0]) & (relative <= FITTED_STRESS[1]) & (angle < LARGEST_ANGLE)
-    inside &= 0.0 <= joint.roughness_coefficient <= LARGEST_JRC
+    inside = in_tested_range(pressure, wall_strength, joint.roughness_coefficient) & (angle < LARGEST_ANGLE)
     return pressure * np.tan(np.radians(angle)), inside
+
+
+def in_tested_range(pressure: Array, wall_strength: float, roughness: float) -> Array:
+    """Return where a stress and a JRC are among those of the tests of Barton and Choubey (1977)."""
+    relative = pressure / wall_strength
+    inside = (relative >= FITTED_STRESS[0]) & (relative <= FITTED_STRESS[1])
+    return np.asarray(inside & (0.0 <= roughness <= LARGEST_JRC))
 
 
 def grasselli_egger(pressure: Array, joint: Joint) -> tuple[Array, Array]:
@@ -241,20 +300,28 @@ CLOSURE_FITS = {
 }
 
 
-def bandis_aperture(roughness: float, wall_strength: float, compressive_strength: float) -> float:
-    """Return the aperture under no load, JRC/5 (0.2 UCS/JCS - 0.1) mm (Bandis et al. 1983)."""
-    return roughness / 5 * (0.2 * (compressive_strength / wall_strength) - 0.1) * MM
+def bandis_constants(
+    roughness_coefficient: float,
+    wall_strength: float,
+    compressive_strength: float | None,
+    aperture: float | None,
+    cycle: int,
+) -> tuple[float, float, float]:
+    """Return aperture a under no load (m), Kni (Pa/m) and Vm (m) of a cycle (Bandis et al. 1983).
 
-
-def bandis_stiffness(roughness: float, wall_strength: float, aperture: float) -> float:
-    """Return Kni = -7.15 + 1.75 JRC + 0.02 JCS/a, MPa and mm (Bandis et al. 1983)."""
-    return (-7.15 + 1.75 * roughness + 0.02 * (wall_strength / MPA) / (aperture / MM)) * (MPA / MM)
-
-
-def bandis_greatest_closure(roughness: float, wall_strength: float, aperture: float, cycle: int) -> float:
-    """Return Vm = A + B JRC + C (JCS/a)^D, MPa and mm, by cycle of load (Bandis et al. 1983)."""
-    a, b, c, d = CLOSURE_FITS[cycle]
-    return float(a + b * roughness + c * ((wall_strength / MPA) / (aperture / MM)) ** d) * MM
+    In mm and MPa a = JRC/5 (0.2 UCS/JCS - 0.1), if not given, Kni = -7.15 + 1.75 JRC + 0.02 JCS/a, and Vm as
+    above; the last two NaN for a joint that is closed.
+    """
+    jrc, jcs = float(roughness_coefficient), float(wall_strength)
+    if aperture is None:
+        strengths = float(compressive_strength or jcs) / jcs
+        aperture = jrc / 5 * (0.2 * strengths - 0.1) * MM
+    aperture = float(aperture)
+    if not aperture > 0:  # without roughness
+        return aperture, math.nan, math.nan
+    stiffness = (-7.15 + 1.75 * jrc + 0.02 * (jcs / MPA) / (aperture / MM)) * (MPA / MM)
+    a, b, c, d = CLOSURE_FITS[int(cycle)]
+    return aperture, stiffness, (a + b * jrc + c * ((jcs / MPA) / (aperture / MM)) ** d) * MM
 
 
 def hyperbolic_closure(pressure: Array, initial_stiffness: float, greatest_closure: float) -> Array:
@@ -302,3 +369,14 @@ HYDRAULIC_APERTURE = {
 GREATEST_VARIATION = 0.5
 # few spots: the next term of the series of (1 - c)/(1 + c), 2 c^2, is then 13 % of E^3
 GREATEST_CONTACT = 0.25
+
+# Size effect
+
+
+def size_factors(ratio: Array, contact_dimension: float, roughness_dimension: float) -> dict[str, Array]:
+    """Return the factors of strength, friction and fracture energy (Carpinteri and Paggi 2009)."""
+    return {
+        "strength_factor": ratio ** (contact_dimension - 2.0),
+        "friction_factor": ratio ** (contact_dimension - roughness_dimension),
+        "fracture_energy_factor": ratio ** (contact_dimension - 1.0),
+    }

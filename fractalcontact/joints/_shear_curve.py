@@ -9,26 +9,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import check_direction, read_direction
+from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
-from fractalcontact.joints._criteria import (
-    FITTED_STRESS,
-    LARGEST_ANGLE,
-    LARGEST_JRC,
-    POSITIVE,
-    SAMPLE_LENGTH,
-    check_quantities,
-)
+from fractalcontact.joints._criteria import LARGEST_ANGLE, POSITIVE, SAMPLE_LENGTH
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 from fractalcontact.joints._strength_envelope import OUTSIDE
 
 # displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
 SMALLEST_PEAK = 1e-4
-# of the integral of the dilation: with 400 it changes by up to 3e-4, stresses against a spring too
-FEWEST_STEPS = 200
 SMOOTH = "the surface has no roughness on the scale of standard profiles: JRC is below 0"
 
 
@@ -39,17 +30,14 @@ def _check(problems: Problems) -> None:
         problems.require(ascending, "displacement", "ascending values")
     problems.numbers("nominal_pressure", **POSITIVE)
     problems.number("residual_friction_angle", above=0, below=LARGEST_ANGLE)
-    check_quantities(problems, "wall_strength", "length")
-    check_quantities(problems, "roughness_coefficient", optional=True)
+    _criteria.check_quantities(problems, "wall_strength", "length")
+    _criteria.check_quantities(problems, "roughness_coefficient", optional=True)
     problems.number("damage_coefficient", at_least=1, at_most=2, optional=True)
     problems.number("normal_stiffness", **POSITIVE, optional=True)
-    has_direction = check_direction(problems)
+    _criteria.check_measured(problems, measured_coefficient)
     if given.surface is None:
         expected = "heights, or a roughness_coefficient in their place"
         problems.require(given.roughness_coefficient is not None, "surface", expected, None)
-    else:
-        with problems.collect():
-            measured_coefficient.validate(given.surface, direction=given.direction if has_direction else "E")
 
 
 @public_result(
@@ -135,38 +123,17 @@ def shear_curve(
     if surface is not None and roughness_coefficient is None:
         measured = measured_coefficient(surface, direction=direction)
         jrc_of_sample = measured["roughness_coefficient"].item()
-    residual, longer = float(residual_friction_angle), float(length)
-    smooth = float(np.fmax(jrc_of_sample, 0.0))
-    jrc = float(_criteria.scaled_roughness(smooth, longer))
-    jcs = _criteria.scaled_wall_strength(float(wall_strength), smooth, longer)
-    peak = max(_criteria.peak_displacement(smooth, longer), SMALLEST_PEAK * longer)
+    jrc, jcs, peak = _criteria.longer_joint(jrc_of_sample, float(wall_strength), float(length))
+    peak = max(peak, SMALLEST_PEAK * float(length))
     given, pressures = float_array(displacement), float_array(nominal_pressure)
-
-    def angles(place: float, sigma: Array) -> tuple[Array, Array]:
-        """Return the angles of friction and dilation (radian) at a displacement under a normal stress."""
-        peak_angle = _criteria.roughness_angle(sigma, jrc, jcs, residual)
-        mobilised = _criteria.mobilised_angle(place / peak, peak_angle, residual)
-        damage = damage_coefficient or _criteria.damage_coefficient(sigma, jrc, jcs)
-        return np.radians(residual + mobilised), np.radians(np.clip(mobilised, 0.0, None) / damage)
-
-    # the dilation is an integral: steps finer than the displacements in between
-    fine = np.union1d(given, np.linspace(0.0, given[-1], FEWEST_STEPS + 1))
+    residual = float(residual_friction_angle)
     stiffness = 0.0 if normal_stiffness is None else float(normal_stiffness)
-    sigma, opening, rise = pressures, np.zeros_like(pressures), angles(0.0, pressures)[1]
-    rows, last, before = [], 0.0, rise
-    for place in fine:
-        start = opening
-        for _ in range(2):  # the stress at the end of the step, once corrected
-            friction, rise = angles(place, sigma)
-            opening = start + 0.5 * (np.tan(rise) + np.tan(before)) * (place - last)
-            sigma = pressures + stiffness * opening
-        rows.append((sigma * np.tan(friction), sigma, np.degrees(friction), np.degrees(rise), opening))
-        last, before = place, rise
-    columns = np.array(rows)[np.searchsorted(fine, given)].transpose(1, 0, 2)
-    names = ("shear_stress", "normal_stress", "friction_angle", "dilatancy_angle", "dilatancy")
-    dims, ratio = ("shear_displacement", "nominal_pressure"), pressures / jcs
-    inside = (ratio >= FITTED_STRESS[0]) & (ratio <= FITTED_STRESS[1]) & (0 <= jrc_of_sample <= LARGEST_JRC)
-    variables: dict[str, Any] = {name: (dims, values) for name, values in zip(names, columns, strict=True)}
+    columns = _criteria.barton_shear(
+        given, pressures, (jrc, jcs, peak), residual, damage_coefficient, stiffness
+    )
+    inside = _criteria.in_tested_range(pressures, jcs, jrc_of_sample)
+    dims = ("shear_displacement", "nominal_pressure")
+    variables: dict[str, Any] = {name: (dims, values) for name, values in columns.items()}
     at_peak = np.radians(residual + _criteria.roughness_angle(pressures, jrc, jcs, residual))
     variables["peak_shear_strength"] = "nominal_pressure", pressures * np.tan(at_peak)
     variables |= {"in_range": ("nominal_pressure", inside), "peak_displacement": peak}

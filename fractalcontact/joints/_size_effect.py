@@ -9,7 +9,7 @@ import xarray as xr
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._criteria import POSITIVE
+from fractalcontact.joints._criteria import POSITIVE, size_factors
 
 
 def _check(problems: Problems) -> None:
@@ -64,11 +64,8 @@ def size_effect(
     >>> factors.strength_factor.item(), factors.fracture_energy_factor.item()
     (0.5, 2.0)
     """
-    ratio, d_s, d_r = float_array(size_ratio), float(contact_dimension), float(roughness_dimension)
-    exponents = {
-        "strength_factor": d_s - 2.0,
-        "friction_factor": d_s - d_r,
-        "fracture_energy_factor": d_s - 1.0,
-    }
-    factors = {name: ("size_ratio", ratio**exponent) for name, exponent in exponents.items()}
-    return xr.Dataset(factors, {"size_ratio": ratio})
+    ratio = float_array(size_ratio)
+    factors = size_factors(ratio, float(contact_dimension), float(roughness_dimension))
+    return xr.Dataset(
+        {name: ("size_ratio", values) for name, values in factors.items()}, {"size_ratio": ratio}
+    )

@@ -9,18 +9,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.compass import check_direction, read_direction
+from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.joints import _criteria
 from fractalcontact.joints._criteria import (
     POSITIVE,
     SAMPLE_LENGTH,
     STRENGTH,
     STRENGTH_REFERENCES,
     Joint,
+    check_measured,
     check_quantities,
+    longer_joint,
 )
 from fractalcontact.joints._directional_roughness import directional_roughness
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
@@ -50,12 +51,7 @@ def _check(problems: Problems) -> None:
         for name in names:
             for need in _missing(name, vars(given)):
                 problems.add(need, f"a value, for criterion {name!r}")
-    has_direction = check_direction(problems)
-    if given.surface is not None:
-        options = {"direction": given.direction} if has_direction else {}
-        for check in (measured_coefficient.validate, directional_roughness.validate):
-            with problems.collect():
-                check(given.surface, **options)
+    check_measured(problems, measured_coefficient, directional_roughness)
 
 
 def _missing(criterion: str, given: Mapping[str, Any]) -> list[str]:
@@ -201,7 +197,9 @@ def strength_envelope(
         "asperity_angle": joint.asperity_angle,
     }
     if length is not None:
-        variables |= _scaled(joint)
+        longer = longer_joint(joint.roughness_coefficient, joint.wall_strength, joint.length)
+        names = ("scaled_roughness_coefficient", "scaled_wall_strength", "peak_displacement")
+        variables |= dict(zip(names, longer, strict=True))
     coords: dict[str, Any] = {"criterion": np.array(chosen), "nominal_pressure": pressure}
     if surface is not None:
         coords["direction"] = read_direction(direction).name
@@ -218,16 +216,6 @@ def _measured(surface: xr.DataArray | None, direction: Any) -> dict[str, xr.Data
     facets = directional_roughness(surface, direction=direction)
     names = ("mean_dip", "area_fraction", "shape", "theta_max")
     return {"roughness_coefficient": jrc["roughness_coefficient"]} | {name: facets[name] for name in names}
-
-
-def _scaled(joint: Joint) -> dict[str, float]:
-    """Return the constants of Barton and Bandis for the length of the joint."""
-    jrc = float(np.fmax(joint.roughness_coefficient, 0.0))
-    return {
-        "scaled_roughness_coefficient": _criteria.scaled_roughness(jrc, joint.length),
-        "scaled_wall_strength": _criteria.scaled_wall_strength(joint.wall_strength, jrc, joint.length),
-        "peak_displacement": _criteria.peak_displacement(jrc, joint.length),
-    }
 
 
 def _explain(result: xr.Dataset, has_surface: bool) -> None:
