@@ -185,11 +185,14 @@ class Lattice:
     spacing : (dy/dx, 1)
     periodic : bool
         Fourier modes of a periodic surface in place of cosine modes.
+    stretch : float
+        Lag along x over that along y of equal increments, without a blur.
     """
 
     shape: tuple[int, int]
     spacing: tuple[float, float]
     periodic: bool = False
+    stretch: float = 1.0
 
     @property
     def axes(self) -> int:
@@ -236,6 +239,11 @@ class Lattice:
         return min(n * d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
 
     @property
+    def steps(self) -> tuple[float, float]:
+        """Spacings along y and x over which increments count."""
+        return self.spacing[0] * self.stretch, self.spacing[1]
+
+    @property
     def median(self) -> float:
         """Median of a squared mode over its expectation."""
         return math.log(2.0) if self.periodic else 0.454936423119572
@@ -243,7 +251,8 @@ class Lattice:
     @cached_property
     def t(self) -> Array:
         """Scales of the Gaussians: from one of eight extents on."""
-        return mixture(-2 * math.ceil(math.log2(8.0 * self.longest)) - 2)
+        longest = max(n * d for n, d in zip(self.shape, self.steps, strict=True))
+        return mixture(-2 * math.ceil(math.log2(8.0 * longest)) - 2)
 
     def transforms(self, spread: float, *, edges: bool) -> list[list[Array]]:
         """Return for each form the transforms (t, modes) of each Gaussian along y and x.
@@ -251,21 +260,22 @@ class Lattice:
         With `edges` those of free ends, as in the expected power; without, the density alone.
         """
         columns = self._transform(1, spread, edges and not self.periodic)
-        is_alike = self.shape[0] == self.shape[1] and self.spacing[0] == self.spacing[1] and not self.periodic
+        is_square = self.shape[0] == self.shape[1] and self.spacing[0] == self.spacing[1]
+        is_alike = is_square and self.stretch == 1.0 and not self.periodic
         rows = columns if is_alike else self._transform(0, spread, edges and not self.periodic)
         return [[along_y, along_x] for along_y, along_x in zip(rows, columns, strict=True)]
 
     @cached_property
     def _sampled(self) -> list[Array]:
         """Densities along y and x of Gaussians that were sampled without a blur."""
-        edges = zip(self.spacing, self.wavenumbers, strict=True)
-        return [densities(self.t * d * d, 0.0, q * d)[0] for d, q in edges]
+        axes = zip(self.steps, self.spacing, self.wavenumbers, strict=True)
+        return [densities(self.t * step * step, 0.0, q * d)[0] for step, d, q in axes]
 
     def _transform(self, axis: int, spread: float, edges: bool) -> list[Array]:
         n, d, q = self.shape[axis], self.spacing[axis], self.wavenumbers[axis]
         if n == 1:
             return [np.ones((self.t.size, 1))] * len(FORMS)
-        t, s = self.t * d * d, spread / d
+        t, s = self.t * self.steps[axis] ** 2, spread / d
         aliased, unaliased = densities(t, s, q * d)
         filtered = np.square(kernel_transfer(s, q * d)) * self._sampled[axis]
         if not edges:

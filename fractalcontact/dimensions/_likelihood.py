@@ -24,11 +24,13 @@ from fractalcontact.dimensions._filled_modes import fill, filling_ratio
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
+    TAPERED,
     clear_modes,
     expected_power,
     lay,
     make_bins,
     single_waves,
+    stretch,
     whitened,
 )
 from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
@@ -60,7 +62,7 @@ _SEEN = 0.8  # probability from which on a nuisance is named
 _DOUBLE = 2.0**-52  # relative step of the numbers themselves
 _NOISE_ROUNDS = 2  # of the amplitude, by which known noise is divided: it changes by less than 1 % in a third
 _EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
-_GAP_ROUNDS = 2  # corrections for gaps: each starts from the exponent of the one before
+_ROUNDS = 2  # corrections for a stretch and for gaps: each starts from the pilot of the one before
 _LEAST_BINS = 3
 
 
@@ -170,13 +172,14 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
     scale = _rms_increment(heights)
     heights /= scale
     filled = fill(heights)
-    theta, form = _first_fit(filled, lattice, spread)
+    theta, form, lags = _first_fit(filled, lattice, spread)
+    lattice = replace(lattice, stretch=lags)
     if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
         return None
     modes = lattice.power(filled)
     correction: Array | float = 1.0
     information: Array | float = 1.0
-    for rounds in range(0 if is_complete else _GAP_ROUNDS, -1, -1):
+    for rounds in range(_ROUNDS, -1, -1):
         pilot, clean = expected_power(lattice, theta, form)
         sharp = theta.copy()
         sharp[SPREAD] = 0.0
@@ -192,10 +195,15 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
         ratio = whitened(lattice, power, pilot, keep)
         waves = single_waves(lattice, ratio, keep)
         keep &= ~waves
-        if rounds and np.count_nonzero(keep) >= LEAST * _LEAST_BINS:
-            bins = make_bins(lattice, power, pilot, keep, information=information)
+        is_same = lattice.stretch == 1.0 and stretch(lattice, ratio, keep, unblurred) == 1.0
+        if not rounds or (is_complete and is_same):
+            break
+        if not is_complete and np.count_nonzero(keep) >= LEAST * _LEAST_BINS:
+            level = lay(lattice, ratio, keep)
+            bins = make_bins(lattice, power / level, pilot, keep, information=information)
             hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
             form = hypothesis.form
+        lattice = replace(lattice, stretch=stretch(lattice, ratio, keep, unblurred))
     information = information / unevenness(heights)
     level = lay(lattice, ratio, keep)
     return ModeFit(
@@ -203,8 +211,11 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
     )
 
 
-def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[Array, int]:
-    """Return theta and form from the modes of the tapered surface: its edges do not leak into short waves."""
+def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[Array, int, float]:
+    """Return theta, form and stretch from the modes of the tapered surface.
+
+    Its edges do not leak into short waves.
+    """
     torus = Lattice(lattice.shape, lattice.spacing, True)
     if lattice.axes == 2 and not lattice.periodic:  # offsets of rows and columns are in none of the modes
         heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
@@ -221,9 +232,13 @@ def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[
     keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)
     if np.count_nonzero(keep) < LEAST * _LEAST_BINS:
         keep = inside if np.count_nonzero(inside) >= LEAST * _LEAST_BINS else np.ones(keep.shape, dtype=bool)
+    ratio = whitened(torus, power, pilot, keep)
+    torus = replace(torus, stretch=stretch(torus, ratio, keep, pilot, information=TAPERED))
+    y, x = torus.wavenumbers
+    pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
     bins = make_bins(torus, power, pilot, keep, is_tapered=not lattice.periodic)
     hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
-    return theta, hypothesis.form
+    return theta, hypothesis.form, torus.stretch
 
 
 def _without_plane(heights: Array) -> Array:

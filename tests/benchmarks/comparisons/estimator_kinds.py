@@ -215,6 +215,7 @@ KINDS: dict[str, tuple[Callable[..., Array], tuple[float, ...]]] = {
     "slow_rolloff_16": (partial(matern, corner=16.0), THREE),
     "sudden_rolloff_16": (partial(knee, corner=16.0, long_hurst=-1.0), THREE),
     "knee_16": (partial(knee, corner=16.0, long_hurst=0.8), (0.3,)),
+    "sum_lag_3": (partial(sum_of_two, lag=3.0), (0.3,)),
     "sum_lag_8": (partial(sum_of_two, lag=8.0), (0.3,)),
     "high_pass": (high_passed, THREE),
     "mean_3x3": (box_mean, THREE),
@@ -231,9 +232,9 @@ KINDS: dict[str, tuple[Callable[..., Array], tuple[float, ...]]] = {
 }
 
 
-def measure(kind: str, hurst: float, n: int, member: int) -> dict[str, Any]:
+def measure(kind: str, hurst: float, n: int, member: int, seed: int) -> dict[str, Any]:
     """Return a row of `COLUMNS`; a profile has n^2/16 points."""
-    rng = np.random.default_rng([crc32(kind.encode()), int(100 * hurst), n, member])
+    rng = np.random.default_rng([crc32(kind.encode()), int(100 * hurst), n, member, seed])
     heights = KINDS[kind][0](n * n // 16 if kind.startswith("profile") else n, hurst, rng)
     surface = fc.surfaces.from_array(HEIGHT * heights, SPACING)
     start = time.process_time()
@@ -290,6 +291,7 @@ def main() -> None:
     parser.add_argument("--kinds", default=",".join(KINDS))
     parser.add_argument("--sizes", default="128")
     parser.add_argument("--members", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0, help="of another draw of all surfaces")
     parser.add_argument("--out", type=Path, default=Path("kinds"))
     parser.add_argument("--table", action="store_true", help="print the table of what was measured, and stop")
     options = parser.parse_args()
@@ -307,7 +309,7 @@ def main() -> None:
                     for kind in options.kinds.split(","):
                         for hurst in KINDS[kind][1]:
                             if (kind, hurst, n, member) not in done:
-                                row = measure(kind, hurst, n, member)
+                                row = measure(kind, hurst, n, member, options.seed)
                                 writer.writerow(row)
                                 rows.append({name: str(value) for name, value in row.items()})
                 file.flush()
