@@ -110,11 +110,18 @@ def test_force_of_a_plane_between_yielded_spikes_is_shared_as_without_them():
 def test_work_is_bounded_and_told(monkeypatch):
     monkeypatch.setattr(_constrained_cg, "MAX_TRANSFORMS", 3)  # 12 on a plane as small as this one
     surface = fc.surfaces.spectral((64, 64), 1e-5, hurst=0.7, rms_slope=0.1, rng=1)
-    with pytest.warns(ConvergenceWarning, match=r"iteration_limit after \d+ pairs of transforms"):
-        result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=1e6)
-    assert not bool(result["converged"][0])
-    # coarse grids, and one iteration of at most four pairs beyond the bound
-    assert int(result["transforms"][0]) <= 2 * (12 + 5)
+    told = r"step 1: iteration_limit after \d+ pairs of transforms"
+    with pytest.warns(ConvergenceWarning, match=told):
+        result = fc.contact.press(
+            surface, contact_modulus=1e9, nominal_pressure=[0.0, 1e6], keep=("pressure",)
+        )
+    assert result["converged"].values.tolist() == [True, False]
+    meanings = result["stop_reason"].flag_meanings.split()
+    assert [meanings[flag] for flag in result["stop_reason"].values] == ["converged", "iteration_limit"]
+    assert float(result["residual"][1]) > 1e-8
+    np.testing.assert_allclose(result["pressure"][1].mean(), 1e6, rtol=1e-12)  # the force is kept
+    # one iteration of at most five pairs beyond the bound
+    assert int(result["transforms"][1]) <= 12 + 5
     monkeypatch.undo()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
