@@ -171,7 +171,7 @@ def box_counts(
         "box_measure": planes.variable(curve.measure, "box_size"),
         "local_slope": planes.variable(0.0 - local_slope(sizes, curve.measure), "box_size"),
     }
-    return planes.dataset(variables, _size_coords(sizes, planes))
+    return planes.dataset(variables, planes.box_coords(sizes))
 
 
 def analyse(
@@ -213,11 +213,7 @@ def analyse(
         "null_count": planes.variable(null["null_count"], "box_size"),
     }
     notes = _notes(fits, sizes, by_regression=by_regression)
-    return planes.dataset(variables, _size_coords(sizes, planes), notes=notes)
-
-
-def _size_coords(sizes: Array, planes: Planes) -> dict[str, Any]:
-    return {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
+    return planes.dataset(variables, planes.box_coords(sizes), notes=notes)
 
 
 @dataclass(frozen=True)

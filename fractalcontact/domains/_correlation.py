@@ -101,10 +101,9 @@ def analyse(planes: Planes, *, box_sizes: Any = None) -> xr.Dataset:
         "local_slope": planes.variable(local_slope(sizes, mass), "box_size"),
         "null_mass": planes.variable(null, "box_size"),
     }
-    coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
     notes = fit_notes("correlation_dimension", dimension, sizes.size, "square")
     notes["local_slope"] = {"long_name": "local dimension, d ln(mean_mass)/d ln(box_size)"}
-    return planes.dataset(variables, coords, notes=notes)
+    return planes.dataset(variables, planes.box_coords(sizes), notes=notes)
 
 
 def mean_mass(planes: Planes, plane: int, sizes: Array) -> Array:

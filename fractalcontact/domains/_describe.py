@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -27,36 +27,28 @@ from fractalcontact.domains import (
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._masks import Array, Planes, read_planes
 
-ANALYSES: dict[str, Callable[[Planes], xr.Dataset]] = {
-    "box_dimension": _box_counting.analyse,
-    "minkowski_dimension": _minkowski.analyse,
-    "correlation_dimension": _correlation.analyse,
-    "boundary_dimension": _boundary.analyse,
-    "lacunarity": _lacunarity.analyse,
+ANALYSES: dict[str, Any] = {  # modules with a function `analyse` of planes
+    "box_dimension": _box_counting,
+    "minkowski_dimension": _minkowski,
+    "correlation_dimension": _correlation,
+    "boundary_dimension": _boundary,
+    "lacunarity": _lacunarity,
 }
-MEASURES = ("islands", "percolation", *ANALYSES)
+_MODULES = {"islands": _islands, "percolation": _percolation, **ANALYSES}
+MEASURES = tuple(_MODULES)
 DESCRIBED = ("islands", "percolation", *(name for name in ANALYSES if name != "lacunarity"))  # a curve alone
 DESCRIBED_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension")
 NOT_COLLECTED = ("scale_min", "scale_max", "run_time", "integral_range")
 CURVES = ("box_size", "radius", "side")  # the dims of curves, which `describe` leaves out
 OTHER_SIZES = "NaN at sizes of boxes that only the other measures have"
 
-_SOURCES = {
-    "islands": _islands.SOURCE,
-    "percolation": _percolation.SOURCE,
-    "box_dimension": _box_counting.SOURCE,
-    "minkowski_dimension": _minkowski.SOURCE,
-    "correlation_dimension": _correlation.SOURCE,
-    "boundary_dimension": _boundary.SOURCE,
-    "lacunarity": _lacunarity.SOURCE,
-}
 
 Variable = tuple[tuple[str, ...], Array]
 
 
 def sources(measures: Sequence[str]) -> str:
     """Return the sources of several measures."""
-    return joined_references(*(_SOURCES[name] for name in measures if name in _SOURCES))
+    return joined_references(*(_MODULES[name].SOURCE for name in measures))
 
 
 def _check(problems: Problems) -> None:
@@ -164,12 +156,11 @@ def measure_planes(
         result.variables["percolates"] = planes.variable(values["percolates"], "axis")
         result.coords["axis"] = ("axis", np.array(_percolation.AXES))
         result.notes["percolates"] = {"long_name": _percolation.percolation_name(connectivity)}
-    datasets = {name: analyse(planes) for name, analyse in ANALYSES.items() if name in wanted}
+    datasets = {name: module.analyse(planes) for name, module in ANALYSES.items() if name in wanted}
     box_sizes = [dataset["box_size"].values for dataset in datasets.values() if "box_size" in dataset.coords]
     all_sizes = np.unique(np.concatenate([np.empty(0, np.int64), *box_sizes]))
     if all_sizes.size:
-        result.coords["box_size"] = ("box_size", all_sizes)
-        result.coords["box_length"] = ("box_size", all_sizes * planes.side)
+        result.coords |= planes.box_coords(all_sizes)
     for name, dataset in datasets.items():
         _add_analysis(result, name, dataset, all_sizes)
     return result

@@ -27,8 +27,7 @@ SOURCE = (
 )
 MANY_SIZES = 24  # above so many sizes one transform is cheaper than a sum for each
 BLOCKS = 4  # along each axis: 16 give 15 degrees of freedom, and each is still wider than a box of L/8
-LARGEST_INT32 = 2**31 - 1
-LARGEST_INT64 = 2**63 - 1
+LARGEST_INT32, LARGEST_INT64 = (np.iinfo(dtype).max for dtype in (np.int32, np.int64))
 BOXES = ("gliding", "fixed", "along_x", "along_y")
 
 
@@ -140,8 +139,7 @@ def analyse(
     if is_square:
         patch = (values - 1.0) * p[:, None] * area * planes.grid.cell_area
         variables["integral_range"] = planes.variable(patch, "box_size")
-    coords = {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * planes.side)}
-    return planes.dataset(variables, coords, notes=_notes(planes, values, boxes))
+    return planes.dataset(variables, planes.box_coords(sizes), notes=_notes(planes, values, boxes))
 
 
 def _with_interval(planes: Planes, cells: Array, sizes: Array, boxes: str) -> tuple[Array, Array, Array]:

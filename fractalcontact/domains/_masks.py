@@ -103,6 +103,10 @@ class Planes:
         """Return the observed cells of one plane, or None if all of them are."""
         return None if self.valid is None else self.valid[min(plane, self.valid.shape[0] - 1)]
 
+    def box_coords(self, sizes: Array) -> dict[str, Any]:
+        """Return the coordinates of curves over sizes of boxes, in cells and in metres."""
+        return {"box_size": ("box_size", sizes), "box_length": ("box_size", sizes * self.side)}
+
     def variable(self, values: Any, *new_dims: str) -> tuple[tuple[str, ...], Array]:
         """Return (dims, values) with the first axis of `values` spread over the leading dims."""
         values = np.asarray(values)

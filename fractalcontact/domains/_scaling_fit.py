@@ -88,6 +88,24 @@ def fit_regression(sizes: Array, measure: Array) -> Fit:
     return Fit(0.0 - float(slope), float(spread), -weights)
 
 
+def _slopes_by_ratio(sizes: Array, area: Array) -> list[tuple[int, Array, Array, Array]]:
+    """Return the ratio, the places of both sizes and the local dimensions between them, for each of `RATIOS`.
+
+    Ratios that no two sizes have are left out, and all of them where an area is not positive.
+    """
+    if not np.all(area > 0):
+        return []
+    index_of = {int(size): index for index, size in enumerate(sizes)}
+    result = []
+    for ratio in RATIOS:
+        pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
+        if pairs:
+            low, high = np.array(pairs).T
+            local = np.log(ratio**2 * area[low] / area[high]) / np.log(ratio)
+            result.append((ratio, low, high, local))
+    return result
+
+
 def fit_steady_ratio(sizes: Array, area: Array) -> Fit:
     """Mean local slope over a fixed ratio of sizes, for the ratio over which it varies least.
 
@@ -96,21 +114,14 @@ def fit_steady_ratio(sizes: Array, area: Array) -> Fit:
     weighted by the inverse square of their variance. `area` is that of the boxes, N s^2, so that integer
     slopes are exact.
     """
-    if not np.all(area > 0):
-        return Fit(np.nan, np.nan, np.zeros(sizes.size))
-    index_of = {int(size): index for index, size in enumerate(sizes)}
     slopes, variances, weights = [], [], []
-    for ratio in RATIOS:
-        pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
-        if pairs:
-            low, high = np.array(pairs).T
-            local = np.log(ratio**2 * area[low] / area[high]) / np.log(ratio)
-            slopes.append(float(local.mean()))
-            variances.append(float(local.var()))
-            weight = np.zeros(sizes.size)
-            np.add.at(weight, low, 1.0 / (np.log(ratio) * low.size))
-            np.add.at(weight, high, -1.0 / (np.log(ratio) * low.size))
-            weights.append(weight)
+    for ratio, low, high, local in _slopes_by_ratio(sizes, area):
+        slopes.append(float(local.mean()))
+        variances.append(float(local.var()))
+        weight = np.zeros(sizes.size)
+        np.add.at(weight, low, 1.0 / (np.log(ratio) * low.size))
+        np.add.at(weight, high, -1.0 / (np.log(ratio) * low.size))
+        weights.append(weight)
     if not slopes:
         return Fit(np.nan, np.nan, np.zeros(sizes.size))
     dimension, spread, share = weighted_mean(slopes, variances)
@@ -134,14 +145,8 @@ def deviations_of_95_percent(sizes: Array) -> float:
 
 def ratio_slopes(sizes: Array, area: Array) -> tuple[Array, Array]:
     """Return ln s and the local dimensions between sizes of the ratio 2 or 3, whichever vary less."""
-    index_of = {int(size): index for index, size in enumerate(sizes)}
     best = np.zeros(0), np.zeros(0)
-    for ratio in RATIOS:
-        pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
-        if not pairs or not np.all(area > 0):
-            continue
-        low, high = np.array(pairs).T
-        local = np.log(ratio**2 * area[low] / area[high]) / np.log(ratio)
+    for _, low, _, local in _slopes_by_ratio(sizes, area):
         if best[1].size < 2 or (local.size > 1 and local.var() < best[1].var()):
             best = np.log(sizes[low]), local
     return best
