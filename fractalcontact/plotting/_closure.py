@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,8 +16,6 @@ from fractalcontact.plotting._paths import PATH, by_shear
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
-LETTER = 14.0  # points, diameter of the circle around a letter of half that size
-LETTER_NAME = "letter of a marked point"
 LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
 LAWS = {"exponential": _style.DASHED, "hyperbolic": _style.DOTTED}  # line where not preferred
 
@@ -85,8 +82,8 @@ def closure_laws(
     if len(marked) and data.sizes["shear"]:
         row = 0 if shear is None or data.sizes["shear"] == 1 else nearest(data["shear"], shear)
         steps = [int(step) for step in marked]
-        points = panel.x.scale(panel.values(inner)[row, steps]), panel.y.shown[row, steps]
-        mark_points(panel.ax, *points, panel.family.styles[row]["color"])
+        points = panel.values(inner)[row, steps], panel.y.values[row, steps]
+        panel.mark(*points, panel.family.styles[row]["color"])
     return panel.ax
 
 
@@ -121,32 +118,3 @@ def _draw_laws(closure: Any, laws: Any, key: bool, log: bool, units: Units | Non
     for name, other in LAWS.items():
         panel.key(f"{name}, not preferred", **other)
     return panel.finish(log="xy" if log else "y", title="law", legend=key)
-
-
-def mark_points(ax: Axes, x: Any, y: Any, colour: Any, first: int = 0) -> None:
-    """Mark points of a curve with circled letters, beginning with letter number `first`.
-
-    A letter is centred on its point, so that none covers another curve, or above it where another letter is.
-    """
-    ax.plot(x, y, "o", color=colour, ms=3, zorder=4, clip_on=False)
-    to_points = ax.transData + ax.figure.dpi_scale_trans.inverted()
-    placed = [tuple(np.array(text.xyann) + 72 * to_points.transform(text.xy)) for text in _letters(ax)]
-    for number, (a, b) in enumerate(zip(x, y, strict=True), first):
-        if not (np.isfinite(a) and np.isfinite(b)):
-            continue
-        point, lift = 72 * to_points.transform((a, b)), 0.0
-        while any(math.hypot(point[0] - x0, point[1] + lift - y0) < LETTER for x0, y0 in placed):
-            lift += LETTER
-        placed.append((point[0], point[1] + lift))
-        circle = {"boxstyle": "circle,pad=0.25", "fc": ax.get_facecolor(), "ec": colour, "lw": 1.2}
-        leader = {"arrowstyle": "-", "color": colour} if lift else None
-        text = ax.annotate(_style.letter(number), (a, b), (0.0, lift), textcoords="offset points",
-                           size=LETTER / 2, weight="bold", ha="center", va="center_baseline", zorder=5,
-                           annotation_clip=False, bbox=circle, arrowprops=leader)  # fmt: skip
-        text.set_gid(LETTER_NAME)
-        text.set_in_layout(False)
-
-
-def _letters(ax: Axes) -> list[Any]:
-    """Return the letters that are marked on Axes."""
-    return [text for text in ax.texts if text.get_gid() == LETTER_NAME]

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.plotting import _paths, _style
-from fractalcontact.plotting._closure import mark_points
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import nearest, quantity, result_of, table, words
 from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel, distinct
@@ -89,8 +88,7 @@ def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> A
     for number, target in enumerate(marked):
         index = nearest(shear, target)
         if np.isclose(shear[index], target, rtol=1e-6, atol=0.0):
-            place = panel.x.shown[-1, [index]], panel.y.shown[-1, [index]]
-            mark_points(panel.ax, *place, loads.styles[-1]["color"], number)
+            panel.mark(shear[[index]], panel.y.values[-1, [index]], loads.styles[-1]["color"], number)
     return panel.finish()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -17,6 +18,8 @@ from fractalcontact.plotting._units import Quantity
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Styles = Sequence[dict[str, Any]]
+LETTER = 14.0  # points, diameter of the circle around a letter of half that size
+LETTER_NAME = "letter of a marked point"
 LEGEND_WIDTH = 24  # characters: of the size of legends 1.35 inches, a quarter of a panel with its legend
 BAND_OPACITY = 0.14  # of an interval under its curve: five on top of each other hide half of what is below
 
@@ -170,6 +173,31 @@ class LinePanel:
         self.ax.axvline(float(self.x.scale(x)), **style)
         if key:
             self.key(key, **style)
+
+    def mark(self, x: Any, y: Any, colour: Any, first: int = 0) -> None:
+        """Mark points of a curve with circled letters, beginning with letter number `first`.
+
+        A letter is centred on its point, so that none covers another curve, or above it where another is.
+        """
+        ax, x, y = self.ax, self.x.scale(x), self.y.scale(y)
+        ax.plot(x, y, "o", color=colour, ms=3, zorder=4, clip_on=False)
+        to_points = ax.transData + ax.figure.dpi_scale_trans.inverted()
+        letters: list[Any] = [text for text in ax.texts if text.get_gid() == LETTER_NAME]
+        placed = [tuple(np.array(text.xyann) + 72 * to_points.transform(text.xy)) for text in letters]
+        for number, (a, b) in enumerate(zip(x, y, strict=True), first):
+            if not (np.isfinite(a) and np.isfinite(b)):
+                continue
+            point, lift = 72 * to_points.transform((a, b)), 0.0
+            while any(math.hypot(point[0] - x0, point[1] + lift - y0) < LETTER for x0, y0 in placed):
+                lift += LETTER
+            placed.append((point[0], point[1] + lift))
+            circle = {"boxstyle": "circle,pad=0.25", "fc": ax.get_facecolor(), "ec": colour, "lw": 1.2}
+            leader = {"arrowstyle": "-", "color": colour} if lift else None
+            text = ax.annotate(_style.letter(number), (a, b), (0.0, lift), textcoords="offset points",
+                               size=LETTER / 2, weight="bold", ha="center", va="center_baseline", zorder=5,
+                               annotation_clip=False, bbox=circle, arrowprops=leader)  # fmt: skip
+            text.set_gid(LETTER_NAME)
+            text.set_in_layout(False)
 
     def key(self, label: str, **style: Any) -> None:
         """Add an entry to the legend of the kinds of curves, on lines of a legend's width."""
