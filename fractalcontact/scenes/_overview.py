@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,7 @@ import xarray as xr
 from fractalcontact.base.random_effects import random_effects
 from fractalcontact.base.robust import is_far
 from fractalcontact.base.study import group_of
+from fractalcontact.base.units import jrc_text
 from fractalcontact.scenes._result_tables import (
     SCAN,
     Column,
@@ -37,8 +39,18 @@ MAIN_COLUMNS = (
     ("rigid dilatancy", "rigid_dilatancy", None),
     ("peak strength", "peak_shear_strength", None),
 )
+JRC = "roughness_coefficient"
 ENDS = ("fractal_dimension_low", "fractal_dimension_high")
-_COLUMNS = [Column(head, name, decimals) for head, name, decimals in MAIN_COLUMNS]
+
+
+def _jrc(scan: xr.Dataset) -> Any:
+    """Return the roughness coefficient; words for one below its scale."""
+    if JRC not in scan:
+        return None
+    return jrc_text(float(scan[JRC])) if scan[JRC] < 0 else scan[JRC]
+
+
+_COLUMNS = [Column(head, _jrc if name == JRC else name, decimals) for head, name, decimals in MAIN_COLUMNS]
 _ROWS = Rows(
     "scans", (SCAN,),
     (_COLUMNS[0], Column("95 % interval", ENDS, 3), *_COLUMNS[1:], Column("why it failed", "reason")),
@@ -53,11 +65,16 @@ def pictured(tree: xr.DataTree) -> xr.DataTree:
 
 
 def pooled(overview: xr.Dataset) -> xr.Dataset:
-    """Return the mean of every number over the scans, its interval, and the scatter between scans."""
+    """Return the mean of every number over the scans, its interval, and the scatter between scans.
+
+    JRC below its scale is extrapolated, to -40 on a smooth face: it is left out.
+    """
     means: dict[str, tuple[tuple[()], float, dict[str, str]]] = {}
     for key, values in overview.data_vars.items():
         if values.dtype.kind != "f" or str(key).endswith(("_low", "_high")) or key == ERROR:
             continue
+        if key == JRC:
+            values = values.where(values >= 0)
         has_errors = key == "fractal_dimension" and ERROR in overview and overview[ERROR].notnull().any()
         errors = overview[ERROR].values if has_errors else 0.0
         found = random_effects(values.values, errors)
@@ -126,6 +143,9 @@ def scan_facts(tree: xr.DataTree) -> Iterator[str]:
         chosen = names[overview["status"].values == status]
         counts += [f"{chosen.size} {status}: {_few(chosen)}"] if chosen.size else []
     yield "; ".join(counts)
+    if JRC in overview and (overview[JRC] < 0).any():
+        chosen = names[overview[JRC].values < 0]
+        yield f"JRC is below 0, beyond its scale, and left out of the mean: {_few(chosen)}"
     found = {head: names[is_far(overview[name].values)] for head, name, _ in MAIN_COLUMNS if name in overview}
     texts = [f"{head} of {_few(far)}" for head, far in found.items() if far.size]
     if texts:

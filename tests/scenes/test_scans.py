@@ -290,6 +290,25 @@ def test_command_prints_a_row_for_each_scan_and_tells_failures_by_its_exit(tmp_p
     assert "differ by the face alone" in refused.stderr
 
 
+def test_jrc_below_its_scale_is_in_words_and_in_no_mean(tmp_path):
+    (tmp_path / "scans").mkdir()
+    for seed, rms in enumerate((1e-6, 6e-5, 8e-5)):
+        surface = fc.surfaces.fbm((48, 48), 2e-4, hurst=0.8, rms_increment=rms, rng=seed)
+        fc.save(surface, tmp_path / "scans" / f"{seed}.nc")
+    scene = tmp_path / "scans.toml"
+    scene.write_text(
+        'surface.read = "scans/*.nc"\n[want]\njoints = ["roughness_coefficient"]\n', encoding="utf-8"
+    )
+    result = fc.scenes.run(scene, progress=False)
+    jrc = result["overview/roughness_coefficient"].values
+    assert jrc[0] < 0 < min(jrc[1:])
+    assert float(result["roughness_coefficient"]) == pytest.approx(np.mean(jrc[1:]))
+    assert int(result["roughness_coefficient_scans"]) == 2
+    text = fc.scenes.summary(result)
+    assert "left out of the mean: 0.nc" in text
+    assert "below 0" in next(line for line in text.splitlines() if line.startswith("0.nc"))
+
+
 def test_many_rows_are_cut_with_a_word(study):
     overview = study[2]["overview"].to_dataset().isel(scan=[0, 1, 2, 3, 4] * 20)
     overview["scan"] = [f"scan {n:03d}" for n in range(100)]
