@@ -41,9 +41,7 @@ def love_table(start, stop, table, dy, dx, orders, nodes, weights):  # type: ign
                         corner = b * np.arcsinh(a / abs(b)) + a * np.arcsinh(b / abs(a))
                         total += corner if sy * sx > 0 else -corner
                 table[i, j] = total / (np.pi * dy * dx)
-            elif (
-                reach > 4
-            ):  # each order from the distance on at which the next lower one still leaves rounding
+            elif reach > 4:  # each order from where the next lower one leaves no more than rounding
                 rule = 0 if reach > 100 else 1 if reach > 30 else 2 if reach > 10 else 3
                 for k in range(orders[rule]):
                     for m in range(orders[rule]):

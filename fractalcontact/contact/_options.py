@@ -34,7 +34,9 @@ YASTREBOV = "Yastrebov, Anciaux and Molinari, Tribol. Int. 114:161 (2017) (perim
 # numbers must stay below 1e308
 LARGEST_RATIO = 2.0**300
 SCALE_RANGE = (2.0**-900, 2.0**900)  # of the scales in SI units: doubles end near 2**-1022 and 2**1024
-FORCE_ROUNDING = 1e-12  # relative rounding allowed in a force of exactly hardness times area
+# relative: a force of hardness times area, or of sliding, may miss it by so much, and forces that differ by
+# less share one solution
+FORCE_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,11 @@ class ContactOptions:
         if self.influence is not None:
             return self.influence
         return "spectral" if self.is_periodic(grid) else "disc"
+
+    def stated_on(self, grid: Grid) -> dict[str, str]:
+        """Return what is used on this grid, for the provenance of a result."""
+        boundary = "periodic" if self.is_periodic(grid) else "free"
+        return {"boundary": boundary, "influence": self.influence_on(grid)}
 
     def check_grid(self, grid: Grid, problems: Problems) -> bool:
         """Check boundary, influence and plate radius against shape, spacing and periodicity of a grid."""

@@ -15,30 +15,24 @@ from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_problem
 from fractalcontact.contact.solver import (
-    METHODS,
     Sheared,
     ShearPath,
     check_one_load,
+    check_shear,
     check_sliding,
     solve_shear,
     warn_lay,
 )
 
-GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
-
 
 def _check(problems: Problems) -> None:
     given = problems.given
     problems.number("poisson", above=-1, at_most=0.5)
-    problems.number("friction_coefficient", above=0, at_most=GREATEST_FRICTION)
-    problems.numbers("tangential_force")
+    check_shear(problems)
     check_direction(problems)
-    problems.choice("method", among=METHODS, optional=True)
-    problems.choices("keep", among=SLIP_MAPS)
     load = check_problem(problems, method="fast")
     if load is not None and check_one_load(problems, load):
         friction, poisson = given.friction_coefficient, given.poisson
@@ -172,13 +166,9 @@ def partial_slip(
         warn_lay(
             "fractalcontact.contact.partial_slip: the contact", sheared.superposition_error, stacklevel=4
         )
-    result.attrs = {
-        "method": sheared.method,
-        "boundary": "periodic" if options.is_periodic(grid) else "free",
-        "influence": options.influence_on(grid),
-        "achieved_residual": float(np.fmax.reduce(result["residual"].values)),
-    }
-    return result
+    residual = float(np.fmax.reduce(result["residual"].values))
+    stated = {"method": sheared.method, **options.stated_on(grid)}
+    return result.assign_attrs(stated, achieved_residual=residual)
 
 
 def _dataset(surface: xr.DataArray, grid: Grid, sheared: Sheared) -> xr.Dataset:

@@ -172,13 +172,9 @@ def press(
     warn_steep("fractalcontact.contact.press: the surface", max(slopes), stacklevel=4)
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
-    result.attrs = {
-        "references": options.references(grid),
-        "boundary": "periodic" if options.is_periodic(grid) else "free",
-        "influence": options.influence_on(grid),
-        "achieved_residual": float(np.fmax.reduce(result.variables["residual"].values, axis=None)),
-    }
-    return result
+    residual = float(np.fmax.reduce(result.variables["residual"].values, axis=None))
+    stated = {"references": options.references(grid), **options.stated_on(grid)}
+    return result.assign_attrs(stated, achieved_residual=residual)
 
 
 def _pressed_planes(

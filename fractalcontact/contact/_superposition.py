@@ -37,10 +37,10 @@ from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.schema import SLIP, STICK
 from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path, stiffness_of
+from fractalcontact.contact._options import FORCE_ROUNDING
 from fractalcontact.contact._tangential_operator import TangentialOperator
 
 METHODS = ("superposition", "full")
-FORCE_ROUNDING = 1e-12  # of the normal force: forces that differ by less share one solution
 ROUNDING = 1e-12  # of the least compliance of the plane: an even pressure on a periodic body moves nothing
 BELOW_SLIDING = 1e-6  # relative distance from sliding, where the full displacement grows without bound
 # of the displacement, by `superposition_error`: isotropic surfaces of 64 x 64 to 256 x 256 nodes had .004

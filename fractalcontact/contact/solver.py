@@ -25,14 +25,13 @@ from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning
 from fractalcontact.base.grid import EXCESS_PER_EDGE, Grid, contact_edges
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
-from fractalcontact.base.schema import CONTACT, OPEN, STEEP, STOP_REASONS, YIELDED
+from fractalcontact.base.schema import CONTACT, OPEN, SLIP_MAPS, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._flat_block import block_stiffness
 from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path, stiffness_of
-from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._options import CONTROLS, FORCE_ROUNDING, ContactOptions, LoadPath, check_scale
 from fractalcontact.contact._superposition import (
     ACCEPTABLE_ERROR,
-    FORCE_ROUNDING,
     METHODS,
     ShearPath,
     Superposition,
@@ -51,9 +50,10 @@ __all__ = [
     "ShearPath",
     "Sheared",
     "block_stiffness",
-    "check_scale",
-    "check_sliding",
     "check_one_load",
+    "check_scale",
+    "check_shear",
+    "check_sliding",
     "rms_slope",
     "solve",
     "solve_shear",
@@ -62,8 +62,7 @@ __all__ = [
 ]
 
 PRESSURE_CLASSES = 50  # of a distribution, from 0 to the greatest pressure: enough for a curve of a plot
-# left an error of the stiffness below 1e-5 on rough surfaces of 256 x 256 nodes, .1 one of 5e-4
-PUNCH_TOLERANCE = 1e-2
+GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
 # of the superposition from which the full method starts; 1e-4 took 4 % more transforms
 START_TOLERANCE = 1e-2
 
@@ -212,7 +211,7 @@ def _stiffness(step: Step, before: Step | None, grid: Grid) -> float:
     if before is not None:  # roughly the derivative of the pressure
         change = np.abs(step.solution.pressure - before.solution.pressure)
         guess = np.where(step.contact, change, 0.0)
-    punch = press_punch(step, guess, tolerance=PUNCH_TOLERANCE)
+    punch = press_punch(step, guess)
     stiffness = np.inf if punch is None else stiffness_of(punch) / grid.nominal_area
     return float(stiffness) if np.isfinite(stiffness) else np.nan
 
@@ -314,6 +313,15 @@ def _solve_fully(
         law = (shear.friction, np.array(shear.unit))
         coulomb_path(normal, operator, np.array(shear.forces), superposition.traction(), *law, columns, maps)
     return maps
+
+
+def check_shear(problems: Problems, *, has_friction: bool = False) -> None:
+    """Check friction, tangential forces, method and maps; `has_friction`: the bodies have a coefficient."""
+    friction = {"above": 0, "at_most": GREATEST_FRICTION}
+    problems.number("friction_coefficient", **friction, optional=has_friction)
+    problems.numbers("tangential_force")
+    problems.choice("method", among=METHODS, optional=True)
+    problems.choices("keep", among=SLIP_MAPS)
 
 
 def check_one_load(problems: Problems, load: LoadPath) -> bool:

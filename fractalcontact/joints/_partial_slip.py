@@ -15,7 +15,6 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import SLIP_MAPS
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing
@@ -36,10 +35,7 @@ def _check(problems: Problems) -> None:
 
     given = problems.given
     check_sliding(problems, single=True)
-    problems.number("friction_coefficient", above=0, at_most=1e3, optional=True)
-    problems.numbers("tangential_force")
-    problems.choice("method", among=contact_solver.METHODS, optional=True)
-    problems.choices("keep", among=SLIP_MAPS)
+    contact_solver.check_shear(problems, has_friction=True)
     load = check_pressing(problems, method="fast")
     if load is None or not contact_solver.check_one_load(problems, load):
         return
