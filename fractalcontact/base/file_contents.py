@@ -67,11 +67,11 @@ def stage_rows(result: Any) -> list[tuple[str, ...]]:
 
 def remarks(methods: Sequence[str], texts: Any) -> dict[str, str]:
     """Return texts (..., methods) by method; a text of several methods is listed once, without empty ones."""
-    found: dict[str, dict[str, None]] = {}
+    methods_of: dict[str, dict[str, None]] = {}
     for row in np.reshape(np.asarray(texts, dtype=str), (-1, len(methods))):
         for method, text in zip(methods, row, strict=True):
-            found.setdefault(text, {})[method] = None
-    return {", ".join(names): text for text, names in found.items() if text}
+            methods_of.setdefault(text, {})[method] = None
+    return {", ".join(names): text for text, names in methods_of.items() if text}
 
 
 def _are_stages(stages: Any) -> bool:

@@ -191,8 +191,8 @@ def has_blocks(value: Any) -> bool:
 
 def loaded_bytes(arguments: Mapping[str, Any]) -> float:
     """Return the bytes of the dask arrays among the arguments, once they are loaded: masks are bytes."""
-    given = [arguments[name] for name in PLANES if has_blocks(arguments.get(name))]
-    return float(sum((8 if value.dtype.kind == "f" else 1) * math.prod(value.shape) for value in given))
+    arrays = [arguments[name] for name in PLANES if has_blocks(arguments.get(name))]
+    return float(sum((8 if value.dtype.kind == "f" else 1) * math.prod(value.shape) for value in arrays))
 
 
 def plane_in(arguments: Mapping[str, Any]) -> Plane | None:

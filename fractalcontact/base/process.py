@@ -149,8 +149,8 @@ def _call_in_copy(function: Callable[[int], Any], waiting: int, sender: Connecti
         for number in _numbers_in(waiting):
             with warnings.catch_warnings(record=True) as caught:
                 result = function(number)
-            said = [(each.message, each.category, each.filename, each.lineno) for each in caught]
-            ended.put((number, result, said))
+            messages = [(each.message, each.category, each.filename, each.lineno) for each in caught]
+            ended.put((number, result, messages))
     ended.put(None)
     thread.join()
 
@@ -165,8 +165,8 @@ def _received(receiver: Connection, patience: float) -> Iterator[tuple[int, Any]
     """Yield numbers and results of the copy until none comes in this time; show its warnings again."""
     with suppress(EOFError, OSError):
         while receiver.poll(patience):
-            number, result, said = receiver.recv()
-            for message in said:
+            number, result, messages = receiver.recv()
+            for message in messages:
                 warnings.warn_explicit(*message)
             yield number, result
 

@@ -39,13 +39,13 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0, level: float = 0.
     from scipy.special import ndtri, stdtrit
 
     x, s = np.broadcast_arrays(np.asarray(values, dtype=float), np.asarray(errors, dtype=float))
-    known = np.isfinite(x) & np.isfinite(s)
-    x, variance = x[known], s[known] ** 2
+    is_finite = np.isfinite(x) & np.isfinite(s)
+    x, variance = x[is_finite], s[is_finite] ** 2
     count = x.size
     if count < 2:
         mean = float(x[0]) if count else np.nan
         half = ndtri(0.5 + level / 2) * np.sqrt(variance[0]) if count and variance[0] > 0 else np.nan
-        within = float(s[known].mean()) if count else np.nan
+        within = float(s[is_finite].mean()) if count else np.nan
         return RandomEffects(mean, mean - half, mean + half, np.nan, within, np.nan, count)
     tau2, within = _between(x, variance), float(np.sqrt(variance.mean()))
     total = variance + tau2

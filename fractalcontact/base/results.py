@@ -109,7 +109,9 @@ def public_result(
         signature = inspect.signature(function)
         name = public_name(function)
         # no word is true: what is declared as a flag is True or False
-        flags = sorted(word for word, given in signature.parameters.items() if given.annotation == "bool")
+        flags = sorted(
+            word for word, parameter in signature.parameters.items() if parameter.annotation == "bool"
+        )
 
         takes_spacing = SURFACE in signature.parameters and SPACING not in signature.parameters
 

@@ -12,8 +12,8 @@ FEWEST = 5  # values: of fewer, one that lies apart may well be half of them
 
 def is_far(values: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which of the values lie far from all others: a modified z beyond 3.5; none of a few values."""
-    known = np.isfinite(values)
-    if known.sum() < FEWEST:
+    is_finite = np.isfinite(values)
+    if is_finite.sum() < FEWEST:
         return np.zeros(values.shape, dtype=bool)
-    distance = np.abs(values - np.median(values[known]))
-    return np.asarray(known & (QUARTILE * distance > LIMIT * np.median(distance[known])))
+    distance = np.abs(values - np.median(values[is_finite]))
+    return np.asarray(is_finite & (QUARTILE * distance > LIMIT * np.median(distance[is_finite])))

@@ -564,11 +564,11 @@ def label(data: T, *, keep_notes: bool = False) -> T:
         if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
             _label_own(str(name), coordinate)
         else:
-            given = coordinate.attrs
+            attributes = coordinate.attrs
             _label_variable(str(name), coordinate, is_coordinate=True)
-            if keep_notes and "reason" in given:
-                coordinate.attrs["reason"] = given["reason"]
-            if keep_notes and given.get("comment") == "in cells":
+            if keep_notes and "reason" in attributes:
+                coordinate.attrs["reason"] = attributes["reason"]
+            if keep_notes and attributes.get("comment") == "in cells":
                 coordinate.attrs.update(in_cells(str(name)))
     if not hasattr(data, "data_vars"):
         _label_variable(str(data.name), data.variable, is_coordinate=False)
@@ -576,13 +576,13 @@ def label(data: T, *, keep_notes: bool = False) -> T:
     for name, variable in data.variables.items():
         if name in coordinates:
             continue
-        given = variable.attrs
+        attributes = variable.attrs
         _label_variable(str(name), variable, is_coordinate=False)
-        if given:
-            notes = {key: given[key] for key in NOTES if keep_notes and key in given}
-            if given.get("units") in QUANTITIES[str(name)].other_units:
-                notes["units"] = given["units"]
-            if keep_notes and given.get("units") == "1":
+        if attributes:
+            notes = {key: attributes[key] for key in NOTES if keep_notes and key in attributes}
+            if attributes.get("units") in QUANTITIES[str(name)].other_units:
+                notes["units"] = attributes["units"]
+            if keep_notes and attributes.get("units") == "1":
                 notes |= in_cells(str(name)) | notes
             variable.attrs.update(notes)
     return data

@@ -24,6 +24,8 @@ def member_count(tree: xr.DataTree) -> int:
 
 def of_member(tree: xr.DataTree, number: int) -> xr.DataTree:
     """Return the results of one member of an ensemble."""
-    one: xr.DataTree = tree.map_over_datasets(lambda data: data.isel({MEMBER: number}, missing_dims="ignore"))
-    one.attrs = dict(tree.attrs)
-    return one
+    member_tree: xr.DataTree = tree.map_over_datasets(
+        lambda data: data.isel({MEMBER: number}, missing_dims="ignore")
+    )
+    member_tree.attrs = dict(tree.attrs)
+    return member_tree

@@ -382,8 +382,8 @@ def did_you_mean(word: object, words: Iterable[str]) -> str:
 
 def _interval(what: str, **bounds: float | None) -> str:
     """Return what is expected between bounds, in words."""
-    given = [(sign, bounds[name]) for name, (sign, _) in COMPARISONS.items() if bounds.get(name) is not None]
-    return " ".join([what, " and ".join(f"{sign} {bound:g}" for sign, bound in given)]).strip()
+    limits = [(sign, bounds[name]) for name, (sign, _) in COMPARISONS.items() if bounds.get(name) is not None]
+    return " ".join([what, " and ".join(f"{sign} {bound:g}" for sign, bound in limits)]).strip()
 
 
 def _quoted(words: Iterable[str]) -> str:

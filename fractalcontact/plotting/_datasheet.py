@@ -83,10 +83,10 @@ def datasheet(
     >>> [round(float(inches), 2) for inches in panels["strength"].figure.figure.get_size_inches()]
     [8.27, 11.69]
     """
-    found = {name: group_of(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
+    groups = {name: group_of(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
     with Problems("fc.plotting") as problems:
-        expected = f"at least one of joints/{', joints/'.join(found)}"
-        problems.require(any(data is not None for data in found.values()), "tree", expected, NONE)
+        expected = f"at least one of joints/{', joints/'.join(groups)}"
+        problems.require(any(data is not None for data in groups.values()), "tree", expected, NONE)
     import matplotlib.style
 
     page = _style.new_figure(A4) if figure is None else figure
@@ -94,40 +94,40 @@ def datasheet(
         page.set_size_inches(A4)
         page.set_layout_engine("constrained", w_pad=0.07, h_pad=0.07)
         page.set_facecolor("white")
-        return _draw_page(page, tree, found, notes)
+        return _draw_page(page, tree, groups, notes)
 
 
 def _draw_page(
-    page: Figure, tree: xr.DataTree, found: dict[str, xr.Dataset | None], notes: Sequence[str]
+    page: Figure, tree: xr.DataTree, groups: dict[str, xr.Dataset | None], notes: Sequence[str]
 ) -> dict[str, Axes]:
     """Draw the rows of the page; return its panels."""
     panels: dict[str, Axes] = {}
-    tests, curve = found["direct_shear"], found["shear_curve"]
+    tests, curve = groups["direct_shear"], groups["shear_curve"]
     is_sheared = tests is not None or curve is not None
     # title, strength, shear test (no room without one), stiffness and flow, limits
     ratios = (0.95, 3.0, 2.7 if is_sheared else 0.05, 2.5, 2.05)
     parts: Any = page.subfigures(len(ratios), 1, height_ratios=ratios)
     title = str(tree.attrs.get("title") or tree.name or "joint")
     parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
-    facts = "\n".join([_source(tree), *_input_lines(found)])
+    facts = "\n".join([_source(tree), *_input_lines(groups)])
     parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
     left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.75))
-    numbers = [*_roughness_lines(found), *_closure_lines(found["closure_laws"])]
+    numbers = [*_roughness_lines(groups), *_closure_lines(groups["closure_laws"])]
     left.text(0.08, 0.96, "\n".join(numbers), size=7.5, va="top", linespacing=1.4)
-    if found["strength_envelope"] is not None:
+    if groups["strength_envelope"] is not None:
         panels["strength"] = right.add_subplot()
         _style.style_axes(panels["strength"])
-        strength_envelope(found["strength_envelope"], tests=found["direct_shear"], ax=panels["strength"])
+        strength_envelope(groups["strength_envelope"], tests=groups["direct_shear"], ax=panels["strength"])
     if is_sheared:
         beside = curve if tests is not None else None
         curves = shear_curve(curve if tests is None else tests, beside=beside, axes=parts[2])
         panels |= zip(("shear stress", "dilatancy"), curves, strict=True)
     panels |= zip(
         ("normal stiffness", "mean gap", "transmissivity"),
-        _flow_panels(parts[3], found["closure"], found["closure_laws"], found["transmissivity"]),
+        _flow_panels(parts[3], groups["closure"], groups["closure_laws"], groups["transmissivity"]),
         strict=True,
     )
-    lines = list(_limits(found, notes))
+    lines = list(_limits(groups, notes))
     parts[4].text(0.03, 0.95, "Limits of validity", size=9, weight="bold", va="top")
     parts[4].text(0.03, 0.86, "\n".join(lines[:MOST_LINES]), size=6.5, va="top", linespacing=1.35)
     return panels
@@ -146,11 +146,11 @@ def _source(tree: xr.DataTree) -> str:
     return f"face of {edges}, {spacing} apart; {version}"
 
 
-def _input_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
+def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
     """Yield what was scanned, and the constants of the material and the direction that were assumed."""
     stated: dict[str, Any] = {}
     for name in ("closure", "direct_shear", "shear_curve", "strength_envelope"):
-        data = found[name]
+        data = groups[name]
         stated |= {} if data is None else provenance_of(data).get("parameters", {})
     crack = stated.get("crack")
     if isinstance(crack, dict):
@@ -172,9 +172,9 @@ def _input_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
         yield "assumed: " + "; ".join(texts)
 
 
-def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
+def _roughness_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
     """Yield the lines of the roughness and of the strength in numbers."""
-    coefficient, facets, tests = (found[name] for name in (*ROUGHNESS, "direct_shear"))
+    coefficient, facets, tests = (groups[name] for name in (*ROUGHNESS, "direct_shear"))
     if coefficient is not None:
         yield "Roughness"
         for direction in words(coefficient["direction"]):
@@ -192,7 +192,7 @@ def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
         values = [f"{float(one['roughness_metric']):.1f}° at {float(one['azimuth']):g}°" for one in extremes]
         yield f"  θmax/(C+1): {values[0]}"
         yield f"      to {values[1]}"
-    envelope = found["strength_envelope"]
+    envelope = groups["strength_envelope"]
     if envelope is not None:
         yield f"  asperity angle: {float(envelope['asperity_angle']):.1f}°"
     if tests is not None:
@@ -204,7 +204,7 @@ def _roughness_lines(found: dict[str, xr.Dataset | None]) -> Iterator[str]:
                      ("nominal_pressure", "peak_shear_strength", "residual_shear_strength")]  # fmt: skip
             angle = float(row["peak_friction_angle"])
             yield f"  under {texts[0]}: {texts[1]} ({angle:.0f}°), {texts[2]}"
-    water = found["uplift"]
+    water = groups["uplift"]
     if water is not None:
         yield ""
         yield from _uplift_lines(water)
@@ -320,19 +320,19 @@ def secant_stiffness(pressure: Any, closure: Any) -> Any:
     return result
 
 
-def _limits(found: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterator[str]:
+def _limits(groups: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterator[str]:
     """Yield lines: the notes, what the criteria assume and where, and what the results say of themselves."""
     texts = dict.fromkeys(notes)
-    envelope = found["strength_envelope"]
+    envelope = groups["strength_envelope"]
     if envelope is not None:
         texts |= dict.fromkeys(_criteria(envelope))
-    for name, data in found.items():
+    for name, data in groups.items():
         for variable in () if data is None else data.drop_vars("bulk_closure", errors="ignore").values():
             comment = str(variable.attrs.get("comment", ""))
             if comment and not comment.startswith(("NaN", "outside the range of the criterion")):
                 quantity = str(variable.attrs.get("long_name", name.replace("_", " ")))
                 texts[f"{quantity}: {comment}"] = None
-    if found["direct_shear"] is not None:
+    if groups["direct_shear"] is not None:
         texts["direct shear: one hardness, no gouge, no cohesion; no asperity smaller than the spacing"] = (
             None
         )

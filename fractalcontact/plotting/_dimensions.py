@@ -92,12 +92,12 @@ def _curves_in(
 ) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
     """Return the scaling curves by name, and the estimates."""
     if isinstance(curves, xr.DataTree) and curves.children:
-        given: Any = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
+        by_name: Any = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
         estimates = curves.to_dataset() if estimates is None and curves.has_data else estimates
     else:
         is_one = not isinstance(curves, Mapping) or isinstance(curves, xr.Dataset | xr.DataTree)
-        given = {"": curves} if is_one else curves
-    datasets = {str(name): as_dataset(curve, "curves") for name, curve in given.items()}
+        by_name = {"": curves} if is_one else curves
+    datasets = {str(name): as_dataset(curve, "curves") for name, curve in by_name.items()}
     if units is not None:
         require_units(datasets.values(), units)
         datasets = {name: marked(curve, units) for name, curve in datasets.items()}

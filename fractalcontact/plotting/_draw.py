@@ -269,12 +269,12 @@ def _data_of(tree: xr.DataTree, row: Row) -> Any:
 
 def _rows_with_data(tree: xr.DataTree) -> dict[str, Row]:
     """Return by file the rows of the table that a study has data for."""
-    found: dict[str, Row] = {}
+    by_file: dict[str, Row] = {}
     for row in FIGURES:
         data = _data_of(tree, row)
         if data is not None and all(data.sizes.get(dim, 0) > 1 for dim in row.dims):
-            found.setdefault(row.file, row)
-    return found
+            by_file.setdefault(row.file, row)
+    return by_file
 
 
 def _write(figure: Figure, target: Path) -> None:

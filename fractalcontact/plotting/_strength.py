@@ -63,11 +63,11 @@ def strength_envelope(
     if not in_range.all():
         panel.key("out of range", **_style.DOTTED)
     if tests is not None:
-        found = result_of(tests, (*TESTS, dims[1]), dims[1:], argument="tests")
+        tested = result_of(tests, (*TESTS, dims[1]), dims[1:], argument="tests")
         for name, marker in TESTS.items():
             style = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
             label = f"direct shear, {name.partition('_')[0]}"
-            points = table(found, dims[1], dims[1:]), table(found, name, dims[1:])
+            points = table(tested, dims[1], dims[1:]), table(tested, name, dims[1:])
             panel.line(label, *points, key=label, clip_on=False, **style)
     return panel.finish(zero="xy")
 
