@@ -144,7 +144,7 @@ def partial_slip(
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     pressing = Pressing.read(crack, WHERE, loads, (influence, disc_radius, None, tolerance))
     rows = [
-        _pushed(ShearedContact(pressing, float(value), towards), path, names)
+        _pushed(ShearedContact.of_crack(pressing, float(value), towards), path, names)
         for value in track(shears, progress, "partial_slip", unit="shear")
     ]
     dims = ("shear", "step", "y", "x")

@@ -155,16 +155,20 @@ def _boundary(crack: Crack) -> str:
 
 
 class ShearedContact:
-    """The delta-surface of one shear between its two bodies, to be pressed along paths of load."""
+    """The heights of a delta-surface (m, on the grid of `pressing`), to be pressed along paths of load."""
 
-    def __init__(self, pressing: Pressing, shear: float, towards: Direction) -> None:
+    def __init__(self, pressing: Pressing, heights: Array, shear: float, towards: Direction) -> None:
         from fractalcontact.contact import solver
 
-        self.pressing = pressing
+        self.pressing, self.heights = pressing, heights
         self.place = f"at a shear of {shear:g} m towards {towards.name}"
+        self.rms_slope = solver.rms_slope(heights, pressing.grid)
+
+    @classmethod
+    def of_crack(cls, pressing: Pressing, shear: float, towards: Direction) -> ShearedContact:
+        """Return that of the crack at a shear."""
         heights = delta_heights(pressing.crack, shear, towards, pressing.where)
-        self.heights = heights[:: pressing.factor, :: pressing.factor]
-        self.rms_slope = solver.rms_slope(self.heights, pressing.grid)
+        return cls(pressing, heights[:: pressing.factor, :: pressing.factor], shear, towards)
 
     def press(self, load: LoadPath, keep: Sequence[str] = ()) -> Columns:
         """Press along a path of load.
@@ -236,7 +240,8 @@ def press_sheared(
     for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear"):
         columns = None if pressed is None else _held_columns(pressed, shear, towards, pressing.load)
         if columns is None:
-            columns = ShearedContact(pressing, float(shear), towards).press(pressing.load, pressing.keep)
+            contact = ShearedContact.of_crack(pressing, float(shear), towards)
+            columns = contact.press(pressing.load, pressing.keep)
         results.append(columns)
     return {name: np.stack([result[name] for result in results]) for name in results[0]}
 
@@ -262,13 +267,13 @@ def press_against_spring(
     dict of ndarray
         As `press_sheared`; normal_force and all that depends on it differ from shear to shear.
     """
-    at_rest = ShearedContact(pressing, 0.0, towards).press(pressing.load)
+    at_rest = ShearedContact.of_crack(pressing, 0.0, towards).press(pressing.load)
     initial_dilatancy = -at_rest["interface_closure"]
     results = []
     for shear, lift in zip(
         track(shears, progress, f"press, towards {towards.name}", unit="shear"), lifted, strict=True
     ):
-        contact = ShearedContact(pressing, float(shear), towards)
+        contact = ShearedContact.of_crack(pressing, float(shear), towards)
         steps = [
             _press_balanced(contact, float(force), float(lift - initial), stiffness)
             for force, initial in zip(pressing.load.values, initial_dilatancy, strict=True)

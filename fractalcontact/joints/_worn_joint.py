@@ -12,6 +12,7 @@ import xarray as xr
 
 from fractalcontact.base.compass import Direction
 from fractalcontact.base.numbers import Array
+from fractalcontact.joints._delta_surface import heights_under
 from fractalcontact.joints._sheared_contact import Pressing, ShearedContact
 
 WHERE = "fractalcontact.joints.direct_shear"
@@ -78,11 +79,13 @@ class WornJoint:
 
     def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
         """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
-        lower, upper = self.faces()
-        pressing = replace(self.pressing, crack=replace(self.crack, lower=lower, upper=upper))
+        layout, (lower, upper) = self.crack.layout, self.crack.faces()
+        shift = layout.shift(position, self.towards.unit)
+        heights = heights_under(lower - self.lower_wear, layout, shift) - (upper + self.upper_wear)
+        pressing = self.pressing
         if elastic:
             pressing = replace(pressing, options=replace(pressing.options, hardness=None))
-        return ShearedContact(pressing, position, self.towards)
+        return ShearedContact(pressing, heights, position, self.towards)
 
     def press(self, contact: ShearedContact, load: float) -> State:
         """Press a contact of this joint under a load, N."""
