@@ -15,11 +15,15 @@ from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._style import AxesArray, Panels
 from fractalcontact.plotting._units import PLAIN, Quantity, Units
 
-SCAN = "scan"
+SCAN, JRC = "scan", "roughness_coefficient"
 FIRST = {
     "fractal_dimension": "fractal dimension D",
-    "roughness_coefficient": "JRC",
+    JRC: "JRC",
     "rms_height": "height Sq",
+    "contact_fraction": "largest contact area",
+    "interface_closure": "largest closure",
+    "rigid_dilatancy": "largest rigid dilatancy",
+    "peak_shear_strength": "largest peak strength",
 }
 NOT_SHOWN = ("_low", "_high", "_error")  # endings of variables
 
@@ -29,7 +33,8 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
     """Draw the distribution of the main numbers of many scans: dimension, JRC, rms height, contact area.
 
     Each panel has one dot for every scan, sorted, with its interval where there is one; the dashed line is
-    the median. Outliers by the modified z of Iglewicz and Hoaglin (beyond 3.5) are red, with their names.
+    the median. Outliers by the modified z of Iglewicz and Hoaglin (beyond 3.5) are red, with their names. A
+    number that is the same for all scans has no panel while others differ, and JRC below its scale no dot.
 
     Parameters
     ----------
@@ -48,10 +53,13 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
     'height Sq (µm)'
     """
     data = result_of(overview, (), (SCAN,), units)
+    if JRC in data:
+        data = data.assign({JRC: data[JRC].where(data[JRC] >= 0)})
     columns = {str(name): values for name, values in data.data_vars.items() if values.dims == (SCAN,)}
     names = [name for name, values in columns.items() if values.dtype.kind == "f"]
     names = [name for name in names if not name.endswith(NOT_SHOWN) and np.isfinite(data[name]).any()]
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
+    names = [name for name in names if data[name].max() > data[name].min()] or names
     with Problems("fc.plotting") as problems:
         problems.require(bool(names), "overview", "numbers over scan", NONE)
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))

@@ -34,10 +34,10 @@ MAIN_COLUMNS = (
     ("dimension D", "fractal_dimension", 3),
     ("JRC", "roughness_coefficient", 1),
     ("Sq", "rms_height", None),
-    ("contact area", "contact_fraction", None),
-    ("closure", "interface_closure", None),
-    ("rigid dilatancy", "rigid_dilatancy", None),
-    ("peak strength", "peak_shear_strength", None),
+    ("largest contact area", "contact_fraction", None),
+    ("largest closure", "interface_closure", None),
+    ("largest dilatancy", "rigid_dilatancy", None),
+    ("largest strength", "peak_shear_strength", None),
 )
 JRC = "roughness_coefficient"
 ENDS = ("fractal_dimension_low", "fractal_dimension_high")
