@@ -20,10 +20,16 @@ from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import Fit
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (box dimension)"
-COVER_DIFFERENCE = 0.02  # of the dimensions of two covers, up to which it widens the interval as it is
-BETWEEN_CLUSTERS = 0.06  # of the dimension in a chosen window, which no scatter within one cluster shows
-SATURATED = 0.5  # share of the boxes from which on gaps between islands are bridged
-NO_POWER_LAW = 0.15  # range of the local slopes in a window from which on there is no power law
+# Measured on 194 sets of known dimension, 100 to 512 cells a side: 1.000 of the intervals hold, their median
+# width is .326. Of the dimensions of two covers, up to which the difference widens the interval as it is:
+# with 0 .985 hold (width .286), with .05 all (.365), without a limit the width is .610
+COVER_DIFFERENCE = 0.02
+# of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the same
+# intervals hold (width .279), with half of it .985 (.301)
+BETWEEN_CLUSTERS = 0.06
+# share of the boxes from which on gaps between islands are bridged; .3 has 4 % more error on these sets, .7 the same
+SATURATED = 0.5
+NO_POWER_LAW = 0.15  # range of local slopes in a window: .69 of the sets are below, of .1 .60, of .2 .70
 BYTES = 6.0  # of a cell: the sums of the longest boxes on two threads, 5.1 as measured, and the mask
 MANY_SIZES, SOME_SIZES = 64, 48  # above so many sizes, some stand for all in the deviation of the null
 

@@ -13,11 +13,19 @@ from fractalcontact.domains._masks import Array, Planes
 
 DEVIATIONS = 2.5  # of the local slopes, to either side of a dimension
 ROUNDING = 1e-14  # smallest half-width of an interval
-RATIOS = (2, 3)  # of the sizes whose local slopes are averaged
+# of the sizes whose local slopes are averaged: those of the default sizes. With 2 alone the error of 194
+# sets of known dimension is .125 in place of .089, with 4 and 5 too .041 (sets built by these), but .974 of
+# their intervals hold in place of all
+RATIOS = (2, 3)
 TINY = 1e-24  # variance of slopes that differ by rounding alone
-LEAST_RATIO, LEAST_SIZES = 8, 6  # of the sizes in a window, and how many it holds
-STEADY = 3e-3  # spread of local slopes below which a longer window is better than a steadier one
-STEADIER = 0.5  # of the unsteadiness of the usual window, from which on another one replaces it
+# of the sizes in a window, and how many it holds: on the same sets a ratio of 4 has an error of .075 and
+# widths of .53 in place of .33, of 16 .105; 4 sizes change nothing, 9 have wider intervals (.35)
+LEAST_RATIO, LEAST_SIZES = 8, 6
+# spread of slopes below which a longer window is better than a steadier one; .001 to .01 are alike
+STEADY = 3e-3
+# of the unsteadiness of the usual window, from which on another one replaces it: never, the error is .113
+# (width .63); from .3 on .093 (.33), .7 .087 (.37), 1 .082 (.41)
+STEADIER = 0.5
 
 
 def default_sizes(shape: Sequence[int]) -> Array:

@@ -21,14 +21,18 @@ from fractalcontact.surfaces._new_surface import check_length
 
 WHERE = "fractalcontact.surfaces.from_points"
 
-RESOLVED = 8.0  # point distances in the shortest wave that gridding leaves unchanged
+# point distances in the shortest wave that gridding leaves: of random points .91 of its amplitude is kept, of
+# waves of 4 distances .69, of 16 .98
+RESOLVED = 8.0
 ALIASED = 4.0  # spacings, the same for a coarse grid, whose shortest waves hold parts of still shorter ones
-BRIDGED = 3.0  # default largest gap, in median longest edges of a triangle
+# default largest gap, in median longest edges of a triangle: of random points 2 loses .0015 of the cells,
+# 2.5 and more none, and 4 closes a hole of 6 point distances
+BRIDGED = 3.0
 FINEST = 0.1  # least spacing over the point distance
 OFF_NODE = 0.05  # largest distance of a point from its node on a uniform grid, in spacings
 EXACT = 1e-6  # of the extent: smaller differences of positions are rounding
 SCATTER = 0.2  # of the largest jump between positions: smaller ones are scatter about a node
-OCCUPIED = 0.5  # least share of the nodes of a uniform grid that have a point
+OCCUPIED = 0.5  # least share of the nodes of a uniform grid that have a point; fewer are interpolated between
 MOST_CELLS = 1 << 28  # 2 GB of heights
 
 

@@ -10,7 +10,8 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import Moments
 from fractalcontact.base.validation import Problems
 
-# the integral of x^power J0(x): power series below, quadrature between, asymptotic series above
+# the integral of x^power J0(x): power series below, quadrature between, asymptotic series above. It is exact
+# to 4e-12; with the first at 10 to 6e-11, with the second at 20 to 7e-5 (powers -1.2 to -3, from .01 to 35)
 _SERIES, _ASYMPTOTIC, _TERMS = 6.0, 40.0, 40
 
 

@@ -192,13 +192,25 @@ def test_unobserved_cells_change_the_dimension_little():
 
 def test_missing_or_short_boundary_is_nan_with_a_reason():
     planes = np.zeros((3, 30, 30), bool)
-    planes[1] = planes[2, 10:20, 10:20] = True
+    planes[1] = planes[2, 9:13, 9:13] = True
     result = fc.domains.boundary_dimension(as_mask(planes))
     assert np.isnan(result.boundary_dimension.values[:2]).all()
     assert "no boundary (2 planes)" in result.boundary_dimension.attrs["comment"]
     assert np.isfinite(result.boundary_dimension[2])
     assert np.isnan(result.ci_low[2])
-    assert "fewer than 200" in result.ci_low.attrs["comment"]
+    assert "one of the 16 blocks" in result.ci_low.attrs["comment"]
+
+
+def test_interval_of_a_short_boundary_covers_the_dimension():
+    rng = np.random.default_rng(8)
+    inside = []
+    for hurst in (0.5, 0.7, 0.9):
+        for _ in range(40):
+            result = fc.domains.boundary_dimension(as_mask(brownian_level_set(32, hurst, rng)))
+            if result.boundary_sides < 200 and np.isfinite(result.ci_low):
+                inside.append(float(result.ci_low) <= 2 - hurst <= float(result.ci_high))
+    assert len(inside) > 50
+    assert np.mean(inside) >= 0.9
 
 
 def test_cells_that_alternate_have_no_interior():
