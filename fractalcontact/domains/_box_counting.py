@@ -27,7 +27,7 @@ COVER_DIFFERENCE = 0.02
 # of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the same
 # intervals hold (width .279), with half of it .985 (.301)
 BETWEEN_CLUSTERS = 0.06
-# share of the boxes from which on gaps between islands are bridged; .3 has 4 % more error on these sets, .7 the same
+# share of the boxes from which on gaps between islands are bridged; .3 has 4 % more error, .7 the same
 SATURATED = 0.5
 NO_POWER_LAW = 0.15  # range of local slopes in a window: .69 of the sets are below, of .1 .60, of .2 .70
 BYTES = 6.0  # of a cell: the sums of the longest boxes on two threads, 5.1 as measured, and the mask

@@ -21,7 +21,7 @@ TESTED_SIZES = (2, 3, 4)  # box sizes in cells at which a set is compared with t
 DEVIATIONS = 3.3  # about one null in a thousand lies further out at a given size
 # up to which a product of factors is exact to 1e-15, where the series is off by 8e-12 (10^6 cells)
 FEW_CELLS = 64
-# cells from which Stirling's series is exact to rounding: its next term is 1 / (360 n^3)
+# cells from which Stirling's series serves: its next term, 1 / (360 n^3), is below 3e-12
 STIRLING_FROM = 1000
 
 
