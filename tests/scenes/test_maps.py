@@ -1,6 +1,6 @@
 """Maps for other programs: what was written is read back with its place, spacing, units and names."""
 
-import importlib.util
+import sys
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -99,9 +99,6 @@ def test_curves_alone_are_refused(closure, tmp_path):
 
 
 def test_missing_library_is_named(closure, tmp_path, monkeypatch):
-    found = importlib.util.find_spec
-    monkeypatch.setattr(
-        "fractalcontact.scenes._maps.find_spec", lambda name: None if name == "pyevtk" else found(name)
-    )
+    monkeypatch.setitem(sys.modules, "pyevtk", None)  # as where it is not installed
     with pytest.raises(MissingExtra, match=r"fractalcontact\[vtk\]"):
         fc.scenes.export(closure, tmp_path)

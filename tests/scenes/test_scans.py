@@ -1,5 +1,6 @@
 """Many scans as one study: which files, what is stacked, what fails, what a stop or a lost worker loses."""
 
+import functools
 import os
 import signal
 import subprocess
@@ -139,22 +140,16 @@ def test_stage_that_reads_a_failing_map_names_itself(tmp_path, monkeypatch):
     text = text.replace('"scans/*.nc"', '["scans/a.nc"]')
     scene.write_text(f"{text}[contact]\ncontact_modulus = 1e10\nnominal_pressure = 1e6\n", encoding="utf-8")
 
+    @functools.wraps(fc.domains.box_dimension)
     def fail(*_, **__):
         raise ArithmeticError("no boxes")
 
-    monkeypatch.setattr("fractalcontact.scenes._parts.public_function", broken("domains.box_dimension", fail))
+    monkeypatch.setattr(fc.domains, "box_dimension", fail)
     with pytest.warns(FractalContactWarning, match="1 of 1 scans"):
         result = fc.scenes.run(scene, progress=False)
     assert str(result["overview/reason"].values[0]) == "domains/box_dimension: ArithmeticError: no boxes"
     assert {"/contact", "/domains/lacunarity"} <= set(result.groups)
     assert "/domains/box_dimension" not in result.groups
-
-
-def broken(name, function):
-    """Return `public_function` with another function under a name."""
-    from fractalcontact.scenes._functions import public_function
-
-    return lambda wanted: function if wanted == name else public_function(wanted)
 
 
 def test_scans_whose_names_differ_by_a_slash_have_their_own_folders(tmp_path):
