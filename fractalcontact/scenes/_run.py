@@ -180,6 +180,7 @@ def _run_scans(
             _results_folder.remove_old_figures(folder, figures)
             whole = summary_of(tree)
             write_report(tree, folder / _results_folder.REPORT, figures, whole)
+        PartStore(folder).clear()  # of marks for workers; each scan has its own parts
         failed = sum(map(bool, studies.reasons.values()))
         if failed:
             message = f"{failed} of {len(scans)} scans failed or are incomplete; the table states why"

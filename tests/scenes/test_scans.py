@@ -203,6 +203,9 @@ def test_workers_change_no_bit(tmp_path):
     results = [fc.scenes.run(scene, out=tmp_path / f"{n}", progress=False, workers=n) for n in (0, 2)]
     same(*results)
     same(*(fc.open(tmp_path / f"{n}" / "result.nc") for n in (0, 2)))
+    assert {path.name for path in (tmp_path / "2").iterdir()} == {
+        path.name for path in (tmp_path / "0").iterdir()
+    }
 
 
 def test_without_a_folder_the_result_has_maps_and_curves_have_their_own_scales(tmp_path):
