@@ -180,9 +180,9 @@ def _dataset(surface: xr.DataArray, grid: Grid, sheared: Sheared) -> xr.Dataset:
         variables["disc_radius"] = sheared.disc_radius
     coords: dict[str, Any] = {
         "step": np.arange(sheared.columns["residual"].size),
-        "closure": sheared.closure,
-        "normal_force": sheared.normal_force,
-        "nominal_pressure": sheared.normal_force / grid.nominal_area,
+        "closure": sheared.normal.closure,
+        "normal_force": sheared.normal.force,
+        "nominal_pressure": sheared.normal.force / grid.nominal_area,
     }
     if sheared.maps:
         coords |= {dim: surface.coords[dim].variable for dim in ("y", "x")}

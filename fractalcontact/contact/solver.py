@@ -50,6 +50,7 @@ __all__ = [
     "ShearPath",
     "Sheared",
     "block_stiffness",
+    "normal_stiffness",
     "check_one_load",
     "check_scale",
     "check_shear",
@@ -211,9 +212,17 @@ def _stiffness(step: Step, before: Step | None, grid: Grid) -> float:
     if before is not None:  # roughly the derivative of the pressure
         change = np.abs(step.solution.pressure - before.solution.pressure)
         guess = np.where(step.contact, change, 0.0)
+    stiffness = normal_stiffness(step, guess) / grid.nominal_area
+    return stiffness if np.isfinite(stiffness) else np.nan
+
+
+def normal_stiffness(step: Step, guess: Array | None = None) -> float:
+    """Return the derivative of the force by the closure, N/m: 0 without contact, else that of a punch.
+
+    `guess` is a pressure to start from. Infinite in full contact of a periodic body.
+    """
     punch = press_punch(step, guess)
-    stiffness = np.inf if punch is None else stiffness_of(punch) / grid.nominal_area
-    return float(stiffness) if np.isfinite(stiffness) else np.nan
+    return 0.0 if punch is None else stiffness_of(punch)
 
 
 def _pressure_distribution(pressure: Array) -> dict[str, Any]:
@@ -234,10 +243,12 @@ def _pressure_distribution(pressure: Array) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Sheared:
-    """A pressed surface sheared along a path; `columns`, `maps` and `disc_radius` as in `Pressed`."""
+    """A pressed surface sheared along a path; `columns`, `maps` and `disc_radius` as in `Pressed`.
 
-    closure: float
-    normal_force: float
+    `normal` is the step under the normal load alone.
+    """
+
+    normal: Step
     contact_area: float
     method: str
     superposition_error: float
@@ -296,7 +307,7 @@ def solve_shear(
     else:
         maps = {name: superposition.map(name) for name in keep}
     area = np.count_nonzero(first.contact) * grid.cell_area
-    return Sheared(first.closure, first.force, area, method, error, columns, maps, path.disc_radius)
+    return Sheared(first, area, method, error, columns, maps, path.disc_radius)
 
 
 def _solve_fully(

@@ -20,11 +20,10 @@ from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing
 
 if TYPE_CHECKING:
-    from fractalcontact.contact.solver import LoadPath, ShearPath
+    from fractalcontact.contact.solver import ShearPath
 
 
 WHERE = "fractalcontact.joints.partial_slip"
-LOAD_CHANGE = 0.01  # of the normal force, over which the normal stiffness is a difference quotient
 STIFFNESSES = ("tangential_stiffness", "shear_stiffness", "interface_stiffness", "stiffness_ratio")
 RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
 BLOCK_ROUNDING = 1e-3  # above the relative error of the tangential stiffness; 1e-4 and 1e-2 gave the same
@@ -173,15 +172,15 @@ def partial_slip(
 
 def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> dict[str, Any]:
     """Return the path of tangential forces at one shear, with the normal stiffness at its load."""
-    from fractalcontact.contact.solver import METHODS
+    from fractalcontact.contact.solver import METHODS, normal_stiffness
 
     pressing = contact.pressing
     sheared = contact.shear(path, keep)
-    area, normal = pressing.crack.nominal_area, sheared.normal_force
+    area, normal = pressing.crack.nominal_area, sheared.normal.force
     block = _block_stiffness(pressing, replace(path, method=sheared.method))
     shear_stiffness = _without_block(sheared.columns["tangential_stiffness"], block) / area
-    normal_stiffness = np.array(_normal_stiffness(contact, normal))
-    interface_stiffness = _without_block(normal_stiffness, pressing.block_stiffness) / area
+    of_normal = np.array(normal_stiffness(sheared.normal))
+    interface_stiffness = _without_block(of_normal, pressing.block_stiffness) / area
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = shear_stiffness / interface_stiffness
     return (
@@ -195,7 +194,7 @@ def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> di
             "contact_area": sheared.contact_area,
             "slip_method": np.int8(METHODS.index(sheared.method)),
             "superposition_error": sheared.superposition_error,
-            "closure": sheared.closure,
+            "closure": sheared.normal.closure,
             "normal_force": normal,
             "nominal_pressure": normal / pressing.grid.nominal_area,
         }
@@ -206,25 +205,12 @@ def _block_stiffness(pressing: Pressing, path: ShearPath) -> float:
     """Return the tangential stiffness of the flat block, all of which sticks, N/m."""
     if path.method == "superposition" or not math.isfinite(pressing.block_stiffness):
         return pressing.block_stiffness * 2 * (1 - path.poisson) / (2 - path.poisson)
-    from fractalcontact.contact.solver import solve_shear
+    from fractalcontact.contact.solver import LoadPath, solve_shear
 
-    flat, load = np.zeros(pressing.grid.shape), _forces(pressing, 1.0)
+    flat, load = np.zeros(pressing.grid.shape), LoadPath("normal_force", (1.0,))
     problem = (pressing.grid, pressing.modulus, pressing.options, load)
     stuck = solve_shear(flat, *problem, replace(path, forces=(0.0,), friction=1.0))
     return float(stuck.columns["tangential_stiffness"][0])
-
-
-def _normal_stiffness(contact: ShearedContact, normal: float) -> float:
-    """Return the derivative of the normal force by the closure, N/m."""
-    if normal <= 0:
-        return 0.0
-    forces = _forces(contact.pressing, normal * (1 - LOAD_CHANGE), normal * (1 + LOAD_CHANGE))
-    change = float(np.diff(contact.press(forces)["closure"])[0])
-    return 2 * LOAD_CHANGE * normal / change if change > 0 else math.inf
-
-
-def _forces(pressing: Pressing, *values: float) -> LoadPath:
-    return replace(pressing.load, control="normal_force", values=values)
 
 
 def _without_block(stiffness: Array, block: float) -> Array:

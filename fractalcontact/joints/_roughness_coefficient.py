@@ -31,16 +31,16 @@ class Regression(NamedTuple):
 
 # Tse and Cruden read the standard profiles every 1.27 mm on prints enlarged 2.5 times in both axes (Li and
 # Zhang 2015, Int. J. Rock Mech. Min. Sci. 77:27), which leaves slopes as they are: 0.508 mm on the joint.
+# The interval of the first one is the default lag.
 REGRESSIONS = {
     "tse_cruden": (Regression(0.508e-3, 32.2, 32.47, None),),
     "yu_vayssade": (
-        Regression(0.25e-3, -4.51, 60.32, 1.0),
         Regression(0.5e-3, -3.47, 61.79, 1.0),
+        Regression(0.25e-3, -4.51, 60.32, 1.0),
         Regression(1e-3, -2.31, 64.22, 1.0),
     ),
     "tatone_grasselli": (Regression(0.5e-3, -10.37, 51.85, 0.60), Regression(1e-3, -6.10, 55.03, 0.74)),
 }
-DEFAULT_LAG = {"tse_cruden": 0.508e-3, "yu_vayssade": 0.5e-3, "tatone_grasselli": 0.5e-3}
 LAG_TOLERANCE = 0.1  # relative; at H = 0.7 it changes the result by 0.4
 FEWEST_PROFILES = 20  # below, the 2.5 % quantile is lower than every profile but one
 BELOW, INSIDE, ABOVE = np.int8(-1), np.int8(0), np.int8(1)
@@ -206,7 +206,7 @@ def _direction_or_default(direction: Any, surface: xr.DataArray) -> Any:
 
 
 def _lag_or_default(lag: float | None, regression: str) -> float:
-    return DEFAULT_LAG[regression] if lag is None else float(lag)
+    return REGRESSIONS[regression][0].interval if lag is None else float(lag)
 
 
 def _coefficient(law: Regression, slope: Any) -> Any:

@@ -49,10 +49,10 @@ def test_is_that_of_the_delta_surface(method, direction):
     assert float(result["sliding_force"][0]) == pytest.approx(FRICTION * FORCE)
 
 
-@pytest.mark.parametrize(("method", "error"), [("superposition", 0.01), ("full", 0.04)])
+@pytest.mark.parametrize(("method", "error"), [("superposition", 1e-9), ("full", 0.04)])
 @pytest.mark.parametrize("poisson", [0.0, 0.2, 0.4])
 def test_stiffness_ratio_before_any_slip(method, error, poisson):
-    """K_s/K_n = 2 (1 - nu)/(2 - nu), K_n from two loads of `press`."""
+    """K_s/K_n = 2 (1 - nu)/(2 - nu); K_n is the limit of the difference of two near loads."""
     joint = crack(96, poisson, periodic=True)
     force = 1e6 * joint.nominal_area
     result = pushed([0.0, 0.5 * FRICTION * force], joint, normal_force=force, method=method)
@@ -60,13 +60,13 @@ def test_stiffness_ratio_before_any_slip(method, error, poisson):
     assert float(result["stuck_ratio"]) == pytest.approx(ratio)
     assert float(result["stiffness_ratio"][0, 0]) == pytest.approx(ratio, rel=error)
     assert float(result["stiffness_ratio"][0, 1]) < 0.9 * ratio  # softer once the edges slip
-    load = np.array([0.99, 1.01]) * force
-    pressed = fc.joints.closure(joint, shear=3e-4, normal_force=load)
+    load = np.array([1 - 1e-5, 1 + 1e-5]) * force
+    pressed = fc.joints.closure(joint, shear=3e-4, normal_force=load, tolerance=1e-13)
     change = float(np.diff(pressed["interface_closure"].values.ravel())[0])
-    stiffness = 0.02 * force / change / joint.nominal_area
-    assert float(result["interface_stiffness"][0]) == pytest.approx(stiffness, rel=1e-6)
+    stiffness = 2e-5 * force / change / joint.nominal_area
+    assert float(result["interface_stiffness"][0]) == pytest.approx(stiffness, rel=2e-4)
     assert result["shear_stiffness"][0, 0] == pytest.approx(
-        float(result["stiffness_ratio"][0, 0]) * stiffness, rel=1e-6
+        float(result["stiffness_ratio"][0, 0]) * stiffness, rel=2e-4
     )
 
 
