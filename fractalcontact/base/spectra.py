@@ -87,6 +87,24 @@ def periodogram(
     return psd, half_weights(shape[-1])
 
 
+def lagged_products(plane: Array, reaches: Sequence[int], periodic: Sequence[bool]) -> Array:
+    """Return the sum of products of values (y, x) apart, for each lag up to `reaches` along both axes.
+
+    The shape is (2 reach_y + 1, 2 reach_x + 1), the lag 0 in the middle. Beyond a free edge all is 0.
+    """
+    shape = [
+        n if wraps else fft.fast_length(n + reach)
+        for n, reach, wraps in zip(plane.shape, reaches, periodic, strict=True)
+    ]
+    padded = np.zeros(shape)
+    padded[: plane.shape[0], : plane.shape[1]] = plane
+    modes = fft.rfft2(padded)
+    power = (modes.real**2 + modes.imag**2).astype(np.complex128)
+    products = fft.irfft2(power, (shape[0], shape[1]), overwrite=True)
+    lags = [np.arange(-reach, reach + 1) % n for reach, n in zip(reaches, shape, strict=True)]
+    return np.asarray(products[np.ix_(*lags)])
+
+
 def ring_edges(shape: Sequence[int], spacing: Sequence[float]) -> Array:
     """Return the edges of the rings of `radial_average`, in rad m-1."""
     finer, step = sorted(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))

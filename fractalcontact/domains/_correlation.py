@@ -12,6 +12,7 @@ from fractalcontact.base import fft
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.power_law import local_slope
 from fractalcontact.base.results import public_result
+from fractalcontact.base.spectra import lagged_products
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
 from fractalcontact.domains._lacunarity import BLOCKS
@@ -217,16 +218,7 @@ def _block_pairs(planes: Planes, plane: int, reaches: Sequence[int], block: Sequ
 
 def count_pairs(plane: Array, grid: Grid, reaches: Sequence[int]) -> Array:
     """Count pairs of cells up to `reaches` apart along y and x; 2 reach + 1 distances along each."""
-    shape = [
-        n if wraps else fft.fast_length(n + reach)
-        for n, reach, wraps in zip(plane.shape, reaches, grid.periodic, strict=True)
-    ]
-    padded = np.zeros(shape)
-    padded[: plane.shape[0], : plane.shape[1]] = plane
-    modes = fft.rfft2(padded)
-    pairs = np.rint(fft.irfft2(modes * modes.conj(), (shape[0], shape[1]), overwrite=True))
-    lags = [np.arange(-reach, reach + 1) % n for reach, n in zip(reaches, shape, strict=True)]
-    return np.asarray(pairs[np.ix_(*lags)])
+    return np.rint(lagged_products(plane, reaches, grid.periodic))
 
 
 def null_mass(cells: float, observed: float, areas: Array) -> Array:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.surfaces._height_planes import with_heights
 
 # a quantile of the absolute residual, and the standard deviation of a Gaussian over it; the median called a
 # third of a coin and of heights of a few steps spikes
@@ -84,8 +84,7 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -
     heights = np.asarray(surface.values, dtype=np.float64)
     is_spike, deviation = _spikes(heights, int(window), float(threshold))
     count = int(is_spike.sum())
-    result = drop_unknown_coords(surface.copy(data=np.where(is_spike, np.nan, heights)).rename("height"))
-    result = result.assign_coords(removed_points=count)
+    result = with_heights(surface, np.where(is_spike, np.nan, heights)).assign_coords(removed_points=count)
     result.attrs = {"removed_points": count, "robust_standard_deviation": deviation}
     return result
 

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes
+from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
 
 BRIGGS = "Briggs, Machine contouring using minimum curvature, Geophysics 39 (1974) 39-48"
 
@@ -93,8 +92,7 @@ def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:  # no
     leading = surface.dims[: surface.ndim - len(grid.shape)]
     missing = np.count_nonzero(np.isnan(planes), axis=tuple(range(1, planes.ndim))).astype(np.int64)
     missing = missing.reshape(surface.shape[: len(leading)])
-    result = drop_unknown_coords(surface.copy(data=filled.reshape(surface.shape)).rename("height"))
-    result = result.assign_coords(filled_points=(leading, missing))
+    result = with_heights(surface, filled).assign_coords(filled_points=(leading, missing))
     result.attrs = {"filled_points": missing}
     return result
 

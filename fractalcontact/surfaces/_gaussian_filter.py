@@ -8,12 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes
+from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
 
 LEAST_SPACINGS = 4  # of the cutoff: a shorter kernel has too few points for its transmission
 _SPREAD = math.sqrt(math.log(2.0) / 2.0) / math.pi  # standard deviation over the cutoff
@@ -84,10 +83,7 @@ def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long")
     grid = read_grid(surface, core_dims(surface))
     planes = height_planes(surface)
     long = np.stack([weighted_mean(plane, float(cutoff), grid.spacing, grid.periodic) for plane in planes])
-    heights = (long if keep == "long" else planes - long).reshape(surface.shape)
-    filtered = drop_unknown_coords(surface.copy(data=heights).rename("height"))
-    filtered.attrs = {}
-    return filtered
+    return with_heights(surface, long if keep == "long" else planes - long)
 
 
 def weighted_mean(heights: Array, cutoff: float, spacing: Sequence[float], periodic: Sequence[bool]) -> Array:

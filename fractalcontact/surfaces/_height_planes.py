@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.coords import drop_unknown_coords, leading_coords
 from fractalcontact.base.grid import core_dims
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
@@ -26,6 +26,13 @@ def height_planes(surface: xr.DataArray) -> Array:
     """Return a copy of the heights as float64, shape (planes, ny, nx) or (planes, nx)."""
     values = np.array(surface.values, dtype=np.float64)
     return values.reshape(-1, *values.shape[values.ndim - len(core_dims(surface)) :])
+
+
+def with_heights(surface: xr.DataArray, heights: Array) -> xr.DataArray:
+    """Return a surface with other heights on the same points, without the attributes of its own."""
+    result = drop_unknown_coords(surface.copy(data=heights.reshape(surface.shape)).rename("height"))
+    result.attrs = {}
+    return result
 
 
 def labelled_rows(surface: xr.DataArray, rows: Sequence[Mapping[str, float]]) -> xr.Dataset:

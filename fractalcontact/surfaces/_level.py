@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import drop_unknown_coords
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes
+from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
 
 POLYNOMIALS = ("mean", "plane", "quadric")
 
@@ -65,10 +64,8 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
         expected = f"observed points that fix a {POLYNOMIALS[order]}"
         message = f"surface: expected {expected}, got too few of them{where}"
         raise InvalidInput("fractalcontact.surfaces.level", [message])
-    residuals = np.stack([residual for residual, _ in fits]).reshape(surface.shape)
-    levelled = drop_unknown_coords(surface.copy(data=residuals).rename("height"))
+    levelled = with_heights(surface, np.stack([residual for residual, _ in fits]))
     if order > 0:
         for dim in {"y", "x"} & set(levelled.coords):
             levelled.coords[dim].attrs.pop("period", None)
-    levelled.attrs = {}
     return levelled

@@ -19,14 +19,14 @@ SHORTEST, LONGEST = 10.0**-DECADES, 10.0**DECADES  # m
 COPIES = 2  # of the heights: the result and one work array
 
 
-def check_shape(problems: Problems, shape: Any, *, smallest: int = 3, profile: bool = True) -> bool:
+def check_shape(problems: Problems, shape: Any, *, profile: bool = True) -> bool:
     """Check for (ny, nx), or for the length of a profile where `profile` allows one."""
     sizes = (shape,) if is_real(shape) else shape
     is_sequence = isinstance(sizes, (Sequence, np.ndarray)) and not isinstance(sizes, (str, bytes))
     if not is_sequence or number_of_axes(sizes) != 1 or len(sizes) not in ((1, 2) if profile else (2,)):
         problems.add("shape", "(ny, nx)" + (" or the length of a profile" if profile else ""), shape)
         return False
-    valid = [problems.integer("shape", size, at_least=smallest) for size in sizes]
+    valid = [problems.integer("shape", size, at_least=3) for size in sizes]
     return all(valid)
 
 

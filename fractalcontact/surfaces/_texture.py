@@ -8,12 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base import fft
 from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
+from fractalcontact.base.spectra import lagged_products
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, height_planes, labelled_rows
 
@@ -142,21 +142,8 @@ def _autocorrelation(
     """Return the autocorrelation up to half of each axis, the lag 0 in the middle, and the largest lags."""
     shape = values.shape
     reach = tuple(min(n - 1, max(n // 2, 1)) if n > 1 else 0 for n in shape)
-    sizes = [
-        n if wraps else fft.fast_length(n + lag) for n, wraps, lag in zip(shape, periodic, reach, strict=True)
-    ]
-    torus = sizes[0], sizes[1]
-
-    def correlated(plane: Array) -> Array:
-        padded = np.zeros(torus)
-        padded[: shape[0], : shape[1]] = plane
-        modes = fft.rfft2(padded)
-        products = fft.irfft2((modes.real**2 + modes.imag**2).astype(complex), torus)
-        rows, columns = (np.arange(-lag, lag + 1) for lag in reach)
-        return np.asarray(products[np.ix_(rows % torus[0], columns % torus[1])])
-
-    number = np.rint(correlated(observed.astype(float)))
-    products = correlated(values)
+    number = np.rint(lagged_products(observed, reach, periodic))
+    products = lagged_products(values, reach, periodic)
     with np.errstate(divide="ignore", invalid="ignore"):
         mean = np.where(number > 0, products / number, np.nan)
     return mean / mean[reach[0], reach[1]], (reach[0], reach[1])
