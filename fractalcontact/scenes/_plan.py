@@ -25,7 +25,6 @@ from fractalcontact.scenes._stages import (
     CURVES,
     FIGURES,
     ISLAND_MAP,
-    PARTIAL_SLIP,
     READ_THE_GAP,
     STAGES,
     Stage,
@@ -129,44 +128,38 @@ def _reasons(scene: Scene) -> dict[str, str]:
     """Return the names of the stages that the wanted results need, each with the reason."""
     want = scene.want
     reasons = {"surfaces": "figures are wanted" if want.figures else "input"}
-    if "height" in want.surfaces:
-        reasons["surfaces"] = "height is wanted"
-    if "describe" in want.surfaces:
-        reasons["surfaces/description"] = "describe is wanted"
-    if "texture" in want.surfaces:
-        reasons["surfaces/texture"] = "texture is wanted"
+    for row in STAGES.values():
+        table, _, word = row.wanted.partition(".")
+        if word and word in getattr(want, table):
+            reasons[row.name] = f"{word} is wanted"
     if want.dimensions:
         reasons["dimensions"] = f"wanted: {', '.join(want.dimensions)}"
         if want.figures:
             curves = [name for name in want.dimensions if name in CURVES]
             reasons |= {f"dimensions/{name}": "figures are wanted" for name in curves}
-    if scene.is_pressed:
-        reasons["contact"] = "press is wanted"
-    if PARTIAL_SLIP in want.contact:
-        reasons[PARTIAL_SLIP] = "partial_slip is wanted"
-    reasons |= _joint_reasons(scene)
-    reasons |= {f"domains/{name}": f"{name} is wanted" for name in want.domains}
+    _add_joint_reasons(scene, reasons)
     return reasons
 
 
-def _joint_reasons(scene: Scene) -> dict[str, str]:
+def _add_joint_reasons(scene: Scene, reasons: dict[str, str]) -> None:
+    """Add the stages of a joint that other stages need."""
     want = scene.want
-    reasons = {name: f"{name} is wanted" for name in want.joints}
     if want.domains and not scene.is_pressed:
-        reasons.setdefault("closure", "the contact set is analysed")
+        reasons.setdefault("joints/closure", "the contact set is analysed")
     for name in READ_THE_GAP:
-        if name in reasons:
-            reasons.setdefault("closure", f"{name} needs the gap")
-    if "closure_laws" in reasons:
-        reasons.setdefault("closure", "closure_laws needs it")
-    if "friction" in reasons and "elastic_dilatancy" not in reasons:
-        reasons.setdefault("rigid_dilatancy", "friction needs a dilatancy")
-    if scene.want.figures and reasons and stage_options(scene, STAGES["joints/delta_surface"], ("shear",)):
-        reasons.setdefault("delta_surface", "figures are wanted")
-    if reasons and scene.upper is not None:
+        if name in want.joints:
+            reasons.setdefault("joints/closure", f"{name} needs the gap")
+    if "closure_laws" in want.joints:
+        reasons.setdefault("joints/closure", "closure_laws needs it")
+    if "friction" in want.joints and "elastic_dilatancy" not in want.joints:
+        reasons.setdefault("joints/rigid_dilatancy", "friction needs a dilatancy")
+    if not any(STAGES[name].group == "joints" for name in reasons):
+        return
+    if want.figures and stage_options(scene, STAGES["joints/delta_surface"], ("shear",)):
+        reasons.setdefault("joints/delta_surface", "figures are wanted")
+    if scene.upper is not None:
         registered = " and registered" if scene.joint.register else ""
-        reasons["faces"] = f"an upper face is given{registered}"
-    return {f"joints/{name}": reason for name, reason in reasons.items()}
+        reasons["joints/faces"] = f"an upper face is given{registered}"
 
 
 def _needs(row: StageType, planned: dict[str, str]) -> tuple[str, ...]:

@@ -51,6 +51,8 @@ class StageType:
         The public function that computes it, for example "joints.closure".
     table : str
         Table of the scene with the arguments of the function.
+    wanted : str
+        List and word of `[want]` that ask for it, "joints.closure" for example.
     takes : {"surface", "crack", "map", "result", "file", "study"}
         The first argument of the function: the lower face, the crack, a map or the whole result of the stage
         it needs, a file of the scene, or all results.
@@ -87,6 +89,7 @@ class StageType:
     needs: tuple[str, ...]
     function: str
     table: str = ""
+    wanted: str = ""
     takes: Literal["surface", "crack", "map", "result", "file", "study"] = "surface"
     options: Callable[[Scene, StageType], dict[str, Any]] = stage_options
     reads: str = ""

@@ -6,7 +6,7 @@ need, `_parts` carries them out.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,9 +33,8 @@ def _joint(
     name: str, rows: Rows | None, needs: tuple[str, ...] = _FACES, function: str = "", **more: Any
 ) -> StageType:
     words: dict[str, Any] = {"takes": "crack", "options": _inputs.joint_options} | more
-    return StageType(
-        f"joints/{name}", needs, f"joints.{function or name}", f"joint.{name}", rows=rows, **words
-    )
+    word, function = f"joints.{name}", f"joints.{function or name}"
+    return StageType(f"joints/{name}", needs, function, f"joint.{name}", word, rows=rows, **words)
 
 
 def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
@@ -49,16 +48,20 @@ def _of_gap(name: str, rows: Rows) -> StageType:
 def _domain(name: str, rows: Rows | None = None, **more: Any) -> StageType:
     source = ("contact or joints/closure",)
     table = f"domains.{name}"
-    return StageType(f"domains/{name}", source, table, table, takes="map", reads="state", rows=rows, **more)
+    return StageType(
+        f"domains/{name}", source, table, table, table, takes="map", reads="state", rows=rows, **more
+    )
 
 
 _ONE: dict[str, Any] = {"one_load": True, "one_direction": True}
 _ROWS = (
     StageType(
-        "surfaces", (), "surfaces.read", "surface", takes="file", rows=_rows.surfaces
+        "surfaces", (), "surfaces.read", "surface", "surfaces.height", takes="file", rows=_rows.surfaces
     ),  # with its description
-    StageType("surfaces/description", _SURFACE, "surfaces.describe"),
-    StageType("surfaces/texture", _SURFACE, "surfaces.texture", rows=_rows.texture),
+    StageType("surfaces/description", _SURFACE, "surfaces.describe", wanted="surfaces.describe"),
+    StageType(
+        "surfaces/texture", _SURFACE, "surfaces.texture", wanted="surfaces.texture", rows=_rows.texture
+    ),
     StageType(
         "dimensions",
         _SURFACE,
@@ -81,6 +84,7 @@ _ROWS = (
         _SURFACE,
         "contact.press",
         "contact",
+        f"contact.{PRESS}",
         options=_inputs.contact_options,
         keeps=CONTACT_MAPS,
         splits=("step",),
@@ -94,6 +98,7 @@ _ROWS = (
         _SURFACE,
         "contact.partial_slip",
         "contact.partial_slip",
+        f"contact.{PARTIAL_SLIP}",
         options=_inputs.slip_options,
         keeps=SLIP_MAPS,
         presses=True,
@@ -180,23 +185,14 @@ _ROWS = (
 STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}
 
 
-def _words(subpackage: str, leave_out: Iterable[str] = ()) -> tuple[str, ...]:
-    rows = (row for row in _ROWS if row.group == subpackage and row.word)
-    return tuple(row.word for row in rows if row.word not in leave_out)
-
-
-CURVES = _words("dimensions")
-JOINT_STAGES = _words("joints", leave_out=("faces",))
-DOMAIN_STAGES = _words("domains")
+CURVES = tuple(row.word for row in _ROWS if row.group == "dimensions" and row.word)
 READ_THE_GAP = tuple(row.word for row in _ROWS if row.reads == "gap")
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
-    "surfaces": ("height", "describe", "texture"),
-    "contact": (PRESS, PARTIAL_SLIP),
-    "joints": JOINT_STAGES,
-    "domains": DOMAIN_STAGES,
-    "keep": (*CONTACT_MAPS, *SLIP_MAPS, ISLAND_MAP),
-}
+    name: tuple(word for table, _, word in (row.wanted.partition(".") for row in _ROWS) if table == name)
+    for name in ("surfaces", "contact", "joints", "domains")
+} | {"keep": (*CONTACT_MAPS, *SLIP_MAPS, ISLAND_MAP)}
+JOINT_STAGES, DOMAIN_STAGES = WANTED["joints"], WANTED["domains"]
 
 
 @dataclass(frozen=True)
