@@ -11,7 +11,9 @@ from scipy.special import stdtrit
 
 from fractalcontact.domains._masks import Array, Planes
 
-DEVIATIONS = 2.5  # of the local slopes, to either side of a dimension
+# of the local slopes, to either side of a dimension: of 130 sets of known dimension .923 of the intervals of
+# the Minkowski and all of the correlation dimension hold; with 2 .815 and .985, with 3 .969 and all
+DEVIATIONS = 2.5
 ROUNDING = 1e-14  # smallest half-width of an interval
 # of the sizes whose local slopes are averaged: those of the default sizes. With 2 alone the error of 194
 # sets of known dimension is .125 in place of .089, with 4 and 5 too .041 (sets built by these), but .974 of
