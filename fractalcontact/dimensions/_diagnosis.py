@@ -23,14 +23,14 @@ _KNOWN = 1 << 20  # squared differences whose quantile is taken: it scatters by 
 _SEAM = 6.0  # deviations of a line of increments; 5.3 was the most of 750 exact surfaces, H .1 to .9
 _ON_LINE = 1024  # points of a line that are looked at: their median scatters by 5 %, a seam doubles it
 _BESIDE = 4.5  # z of the heights beside gaps: 1 of 1e5 surfaces
-_FEWEST_GAPS = 12
+_FEWEST_GAPS = 12  # the scatter of their means is then known to a fifth
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples modulo one are even
 _NORMAL_QUARTILE = 0.6744897501960817
 _ROWS, _SAMPLE = 16, 4096  # rows and heights that are looked at for rounding
 _WHOLE = 0.02  # of a step: distance of rounded heights from whole steps, after a change of unit
 _DISTINCT = 0.5  # share of distinct heights beyond which they are not rounded
 _BLOCKS = 8  # along each axis, in which roughness is compared, and parts of each block along each axis
-_PARTS = 4
+_PARTS = 4  # the scatter within a block has 15 degrees of freedom
 
 
 def diagnose(surface: Surface) -> str:
