@@ -52,9 +52,8 @@ from fractalcontact.contact._tangential_operator import (
 # (192 steps, nu 0, .2 and .5, periodic and free, up to .99 of sliding): these end what does not converge
 MAX_ITERATIONS = 100
 MAX_INNER = 40
-# relative distance from the circle at which a node is on it, and the same of the superposition, which is less
-# accurate; 1e-14 and 1e-9, and 1e-12 and 1e-6, gave the same bits on rough contacts
-AT_BOUND, START_AT_BOUND = 1e-12, 1e-9
+# relative distance from the circle at which a node is on it; 1e-14 gave the same bits on rough contacts
+AT_BOUND = 1e-12
 FORCING = 0.1  # part of the residual that (3) may leave; with 0.3 and more some steps fail and cost more
 # and over the residual, so that the iteration converges faster than linearly; 10 took 3 % more transforms
 FORCING_GROWTH = 100.0
@@ -332,7 +331,7 @@ def shifted_start(last: CoulombState | None, starts: Array, bound: Array, unit: 
     if last is None:
         return np.asarray(unit[:, None] * starts[-1])
     moved = last.q + unit[:, None] * (starts[1] - starts[0])
-    slips = np.abs(starts[1]) >= bound * (1 - START_AT_BOUND)
+    slips = np.abs(starts[1]) >= bound * (1 - AT_BOUND)
     return restore_sum(moved, bound, force, slips)
 
 
