@@ -16,8 +16,8 @@ the bins are normal, and
 
 where delta is what (1) does not hold: nothing; a process of standard deviation tau, correlated over an
 octave; the fourth order in q of a filter that is no Gaussian; or a cut q_c beyond which the bins say
-nothing, sharp (short waves) or with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2
-(long waves). Each has a prior probability (`_discrepancies`).
+nothing, with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2 (long waves). Each has a
+prior probability (`_discrepancies`).
 
 For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
 unit normal variables u, and Laplace's method gives its evidence and a normal distribution of u. The
@@ -292,9 +292,8 @@ def _discrepancies(bins: Bins, pilot_spread: float) -> list[Discrepancy]:
     # between rings of bins; those of one ring differ by less than a tenth of an octave
     ends = np.sort(octaves)
     ends = ends[np.flatnonzero(np.diff(ends) > 0.1)]
-    for cut in ends[ends > max(lowest + _LEFT, highest - _DEEPEST)]:
-        inside = octaves <= cut
-        cuts += [(_CUT * 4.0 ** (octaves - cut), inside), (np.zeros(octaves.size), inside)]
+    short_cuts = ends[ends > max(lowest + _LEFT, highest - _DEEPEST)]
+    cuts += [(_CUT * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
     for cut in ends[ends < min(highest - _LEFT, lowest + _DEEPEST)][::2]:
         cuts.append((_CUT * 4.0 ** (cut - octaves), octaves > cut))
     cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
