@@ -53,9 +53,10 @@ _LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any oth
 _SHARPNESSES = 0.4, 10.0  # a slow change between two exponents, a sudden corner
 _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
 # corner, exponent of long waves and sharpness, with their probability: none, any, and the sum of two surfaces
-# (sharpness 0). Without the last, 9 of 24 intervals of sums with lags of 3 and 8 held H, with .05 22 of 24;
-# with .1, and one half for the two below, an exact interval is 1.3 to 1.5 times as wide.
-_BENDS = {(0.0, 0.0, 1.0): 0.85, (math.nan, math.nan, math.nan): 0.1, (math.nan, math.nan, 0.0): 0.05}
+# (sharpness 0). Of 24 sums with lags of 3 and 8 the intervals of 3 hold H without the last, with .01, .02 and
+# .05 those of 20, 22 and 23; beside a roll-off at half the extent the lower half of an interval is then
+# .06, .09, .21 and .33 wide.
+_BENDS = {(0.0, 0.0, 1.0): 0.85, (math.nan, math.nan, math.nan): 0.14, (math.nan, math.nan, 0.0): 0.01}
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
 _FOURTH = 0.1  # of (s q)^4: the fourth cumulant of a mean over a box has .125
 _HOLDS = (
