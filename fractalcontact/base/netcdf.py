@@ -95,18 +95,19 @@ class GrowingFile:
     """
 
     def __init__(self, target: Path) -> None:
-        self.target, self.stack = target, contextlib.ExitStack()
+        self.target = target
 
     def __enter__(self) -> GrowingFile:
         import netCDF4
 
-        with _writing(self.target):
+        with _writing(self.target), contextlib.ExitStack() as stack:
             self.target.parent.mkdir(parents=True, exist_ok=True)
             clear_partial(self.target.parent)
-            self.temporary = self.stack.enter_context(written_whole(self.target))
+            self.temporary = stack.enter_context(written_whole(self.target))
             with NETCDF_LOCK:
                 self.file = netCDF4.Dataset(self.temporary, "w", format="NETCDF4")
-            self.stack.push(self._close)
+            stack.push(self._close)
+            self.stack = stack.pop_all()  # here an error has left no file behind
         return self
 
     def add(self, result: xr.DataArray | xr.Dataset | xr.DataTree) -> None:

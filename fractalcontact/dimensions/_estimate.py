@@ -159,10 +159,11 @@ def estimate(
     estimates, times = [], np.zeros((len(surfaces), len(names)))
     for row, single in enumerate(surfaces):
         by_likelihood = cache(lambda single=single: _by_likelihood(single, window, noise, psf))
+        too_few = _too_few_points(single)
         for column, name in enumerate(names):
             start = time.perf_counter()
-            if reason := _too_few_points(single):
-                record = undefined(reason)
+            if too_few:
+                record = undefined(too_few)
             elif _row(name) == DEFAULT:
                 record = by_likelihood()  # "default" and "likelihood" share it
             elif name == "increments":

@@ -28,6 +28,7 @@ from fractalcontact.dimensions._mode_bins import (
     clear_modes,
     expected_power,
     lay,
+    levels_by_azimuth,
     make_bins,
     single_waves,
     stretch,
@@ -172,8 +173,8 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
     scale = _rms_increment(heights)
     heights /= scale
     filled = fill(heights)
-    theta, form, lags = _first_fit(filled, lattice, spread)
-    lattice = replace(lattice, stretch=lags)
+    theta, form, ratio_of_lags = _first_fit(filled, lattice, spread)
+    lattice = replace(lattice, stretch=ratio_of_lags)
     if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
         return None
     modes = lattice.power(filled)
@@ -195,17 +196,19 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
         ratio = whitened(lattice, power, pilot, keep)
         waves = single_waves(lattice, ratio, keep)
         keep &= ~waves
-        is_same = lattice.stretch == 1.0 and stretch(lattice, ratio, keep, unblurred) == 1.0
-        if not rounds or (is_complete and is_same):
+        levels = levels_by_azimuth(lattice, ratio, keep)
+        level = lay(levels)
+        if not rounds:
+            break
+        ratio_of_lags = stretch(lattice, levels, unblurred)
+        if is_complete and lattice.stretch == ratio_of_lags == 1.0:
             break
         if not is_complete and np.count_nonzero(keep) >= LEAST * _LEAST_BINS:
-            level = lay(lattice, ratio, keep)
             bins = make_bins(lattice, power / level, pilot, keep, information=information)
             hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
             form = hypothesis.form
-        lattice = replace(lattice, stretch=stretch(lattice, ratio, keep, unblurred))
+        lattice = replace(lattice, stretch=ratio_of_lags)
     information = information / unevenness(heights)
-    level = lay(lattice, ratio, keep)
     return ModeFit(
         lattice, scale, power / level, pilot, keep, waves, ratio / level, information, level, theta, form
     )
@@ -232,8 +235,8 @@ def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[
     keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)
     if np.count_nonzero(keep) < LEAST * _LEAST_BINS:
         keep = inside if np.count_nonzero(inside) >= LEAST * _LEAST_BINS else np.ones(keep.shape, dtype=bool)
-    ratio = whitened(torus, power, pilot, keep)
-    torus = replace(torus, stretch=stretch(torus, ratio, keep, pilot, information=TAPERED))
+    levels = levels_by_azimuth(torus, whitened(torus, power, pilot, keep), keep)
+    torus = replace(torus, stretch=stretch(torus, levels, pilot, information=TAPERED))
     y, x = torus.wavenumbers
     pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
     bins = make_bins(torus, power, pilot, keep, is_tapered=not lattice.periodic)

@@ -9,6 +9,7 @@ those of single waves.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -90,10 +91,28 @@ def single_waves(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     return marked
 
 
-def stretch(
-    lattice: Lattice, ratio: Array, keep: Array, unblurred: Array, *, information: float = 1.0
-) -> float:
-    """Return the stretch of the lattice, as the level of each azimuth shows it.
+@dataclass(frozen=True)
+class Levels:
+    """Relative power by sector of azimuth, among the waves whose aliases and filters are alike.
+
+    Attributes
+    ----------
+    sector : ndarray of int
+        Of each mode.
+    level, information : ndarray, shape (sectors,)
+        Logarithm of the mean power over that expected, and the inverse of its variance; 0 without modes.
+    keep : ndarray of bool
+        Modes that were averaged.
+    """
+
+    sector: Array
+    level: Array
+    information: Array
+    keep: Array
+
+
+def stretch(lattice: Lattice, levels: Levels, unblurred: Array, *, information: float = 1.0) -> float:
+    """Return the stretch of the lattice, as the levels by azimuth show it.
 
     The power of waves of one length is (cos^2 + sin^2 / a^2)^(k / 2) of their azimuth, where `unblurred`, the
     expected power without a blur, has the slope k. The stretch a, even in its logarithm, has the least chi
@@ -101,14 +120,12 @@ def stretch(
     """
     from scipy.special import chdtri
 
-    if lattice.axes == 1:
+    level, weight = levels.level, levels.information
+    if np.count_nonzero(weight) < 3:  # a profile has one
         return 1.0
-    _, level, weight, keep = _by_azimuth(lattice, ratio, keep)
-    if np.count_nonzero(weight) < 3:
-        return 1.0
-    lnq = np.log(lattice.q[keep])
+    lnq = np.log(lattice.q[levels.keep])
     lnq -= lnq.mean()
-    slope = lnq @ np.log(unblurred[keep]) / (lnq @ lnq)
+    slope = lnq @ np.log(unblurred[levels.keep]) / (lnq @ lnq)
     azimuth = 0.5 * math.pi / _SECTORS * (np.arange(_SECTORS) + 0.5)
     logarithms = np.r_[np.linspace(-_STRETCH, _STRETCH, _STRETCHES), math.log(lattice.stretch)]
     squares = np.cos(azimuth) ** 2 + np.sin(azimuth) ** 2 * np.exp(-2.0 * logarithms[:, None])
@@ -121,7 +138,7 @@ def stretch(
     return math.exp(logarithms[best] * (1.0 - by_chance / gain)) if gain > by_chance else 1.0
 
 
-def lay(lattice: Lattice, ratio: Array, keep: Array) -> Array:
+def lay(levels: Levels) -> Array:
     """Return the relative power of the azimuth of each mode, shrunk to one as far as chance explains it.
 
     An anisotropic self-affine surface has a level of its own in each direction, and the same exponent. The
@@ -130,20 +147,15 @@ def lay(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     """
     from scipy.special import chdtri
 
-    if lattice.axes == 1:
-        return np.ones(ratio.shape)
-    sector, level, information, _ = _by_azimuth(lattice, ratio, keep)
-    square = float(information @ np.square(level))
-    freedom = np.count_nonzero(information) - 1
+    square = float(levels.information @ np.square(levels.level))
+    freedom = np.count_nonzero(levels.information) - 1
     by_chance = float(chdtri(freedom, _FALSE_ALARM)) if freedom > 0 else math.inf
     shrunk = 1.0 - by_chance / square if square > by_chance else 0.0
-    return np.asarray(np.exp(shrunk * level)[sector])
+    return np.asarray(np.exp(shrunk * levels.level)[levels.sector])
 
 
-def _by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> tuple[Array, Array, Array, Array]:
-    """Return the sector of each mode, the logarithm of the level of each sector, the inverse of its variance,
-    and the modes that it was taken from.
-    """
+def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
+    """Return the levels of some modes; `ratio` is their power over that expected."""
     from scipy.special import digamma, polygamma
 
     y, x = lattice.wavenumbers
@@ -159,7 +171,7 @@ def _by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> tuple[Array, Arr
     mean = np.bincount(sector[keep], ratio[keep], minlength=_SECTORS)[known] / count[known]
     values = np.log(np.maximum(mean, 1e-12)) + np.log(degrees) - digamma(degrees)
     level[known] = values - information[known] @ values / information.sum() if known.any() else 0.0
-    return sector, level, information, keep
+    return Levels(sector, level, information, keep)
 
 
 def make_bins(

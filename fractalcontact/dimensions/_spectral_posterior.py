@@ -59,9 +59,8 @@ _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
 _BENDS = {(0.0, 0.0, 1.0): 0.85, (math.nan, math.nan, math.nan): 0.14, (math.nan, math.nan, 0.0): 0.01}
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
 _FOURTH = 0.1  # of (s q)^4: the fourth cumulant of a mean over a box has .125
-_HOLDS = (
-    0.8  # probability that (1) holds without a process: exact intervals stay as narrow with sums as before
-)
+# probability that (1) holds without a process: with .8 exact intervals are as narrow as without sums
+_HOLDS = 0.8
 _UNCUT = 0.8  # probability that there is no cut: of 0.5 and 0.8 for both the narrower interval of a blur of 1
 _CUT = 0.5  # logarithm of the power that is off at a cut
 _LEFT = 2.5  # octaves between cuts, to tell an exponent from a corner
@@ -507,6 +506,11 @@ def _copy(source: Array, target: Array) -> None:
 @inner_kernel
 def _misfit(
     u: Array,
+    theta: Array,
+    model: Array,
+    residual: Array,
+    whitening: Array,
+    level: Array,
     fixed: Array,
     prior: Array,
     form: int,
@@ -516,11 +520,6 @@ def _misfit(
     t: Array,
     white: Array,
     lnq: Array,
-    level: Array,
-    whitening: Array,
-    theta: Array,
-    model: Array,
-    residual: Array,
 ) -> float:
     """Fill theta, the logarithms of the bins and their white residuals; return the sum of squares with u."""
     _parameters(u, fixed, prior, theta)
@@ -560,6 +559,7 @@ def _maxima(
     before, after, totals = np.zeros(p), np.zeros(p), np.empty(starts.shape[0])
     for m in range(fixed.shape[0]):
         held, table, form, free = fixed[m], tables[forms[m]], forms[m], 0
+        problem = (held, prior, form, axes, table, nodes, t, white, lnq)
         for i in range(p):
             free += math.isnan(held[i])
         number = starts.shape[0] if free > 1 else starts.shape[0] // 4
@@ -586,23 +586,7 @@ def _maxima(
                         trial[i] = starts[start, i] if math.isnan(held[i]) else 0.0
                     if attempt == 1:
                         _copy(before, trial)
-                    total = _misfit(
-                        trial,
-                        held,
-                        prior,
-                        form,
-                        axes,
-                        table,
-                        nodes,
-                        t,
-                        white,
-                        lnq,
-                        level,
-                        white_k,
-                        values,
-                        shifted,
-                        trial_residual,
-                    )
+                    total = _misfit(trial, values, shifted, trial_residual, white_k, level, *problem)
                     if attempt == 0 or total < objective:
                         objective = total
                         _copy(trial, u)
@@ -636,23 +620,7 @@ def _maxima(
                             longest = max(longest, abs(move[i]))
                         for i in range(p):
                             trial[i] = u[i] + move[i] * (0.7 / longest)
-                        total = _misfit(
-                            trial,
-                            held,
-                            prior,
-                            form,
-                            axes,
-                            table,
-                            nodes,
-                            t,
-                            white,
-                            lnq,
-                            level,
-                            white_k,
-                            values,
-                            shifted,
-                            trial_residual,
-                        )
+                        total = _misfit(trial, values, shifted, trial_residual, white_k, level, *problem)
                         if total < objective:
                             gain = objective - total
                             objective = total

@@ -244,28 +244,28 @@ def _combs(found: Sequence[Wave], shape: tuple[int, ...]) -> list[tuple[Array, d
         best: dict[int, Wave] = {}
         cycles = np.array([wave.cycles for wave in left])
         divisors = np.arange(1, _MULTIPLES + 1)
-        multiples = np.arange(1, 2 * _MULTIPLES)[:, None, None] * cycles[0]
-        apart = _unfolded(cycles, multiples / divisors[:, None, None, None], shape)[1]
-        most = np.count_nonzero((apart < _SAME).any(axis=1), axis=1)  # of waves that may be members
-        for divisor in range(1, _MULTIPLES + 1):
+        all_apart = _apart(cycles, cycles[0] / divisors[:, None], 2 * _MULTIPLES, shape)
+        for divisor, apart in enumerate(all_apart, 1):
             least = max(len(best), 1 + (divisor > _DIVISORS))
-            if most[divisor - 1] <= least:
-                continue
-            members = _members(left, cycles[0] / divisor, 2 * _MULTIPLES, shape)
-            if len(members) > least:
+            may_be = int(np.count_nonzero((apart < _SAME).any(axis=0)))
+            if may_be > least and len(members := _members(left, apart)) > least:
                 best = members
         best = best or {1: left[0]}
         if len(best) > _FEW:
-            best |= _members(left, _base(best, shape), _MOST_MULTIPLES, shape)
+            best |= _members(left, _apart(cycles, _base(best, shape), _MOST_MULTIPLES, shape))
         left = [wave for wave in left if wave not in best.values()]
         result.append((_base(best, shape), best))
     return result
 
 
-def _members(waves: Sequence[Wave], base: Array, most: int, shape: tuple[int, ...]) -> dict[int, Wave]:
-    """Return the waves that are multiples of given cycles per point, up to some number, by their multiple."""
-    cycles = np.array([wave.cycles for wave in waves])
-    apart = _unfolded(cycles, np.arange(1, most)[:, None, None] * base, shape)[1]
+def _apart(cycles: Array, bases: Array, most: int, shape: tuple[int, ...]) -> Array:
+    """Return how many modes waves are apart from the multiples of bases: (..., multiple below most, wave)."""
+    multiples = np.arange(1, most)[:, None] * bases[..., None, :]
+    return _unfolded(cycles, multiples[..., None, :], shape)[1]
+
+
+def _members(waves: Sequence[Wave], apart: Array) -> dict[int, Wave]:
+    """Return the waves that are multiples of a base, by their multiple; `apart` as of `_apart`."""
     members: dict[int, Wave] = {}
     for row, column in np.argwhere(apart < _SAME):
         if waves[column] not in members.values():

@@ -116,10 +116,11 @@ def spectral(
         plateau.
     normalise : {"realisation", "expectation"}
         Whether this surface has the rms value, to rounding, or the expectation over all surfaces.
-    anisotropy_ratio, direction : float, and str or float
-        Correlations are `anisotropy_ratio` times as long along `direction` (a compass word, or degrees
-        anticlockwise from E) as across it; only with one exponent. The cut-offs are those of the isotropic
-        surface.
+    anisotropy_ratio : float
+        Correlations are `anisotropy_ratio` times as long along `direction` as across it; only with one
+        exponent. The cut-offs are those of the isotropic surface.
+    direction : str or float
+        Compass word, or degrees anticlockwise from E.
     members : int, optional
         Number of independent surfaces, along a dim `member`. Member i is the same for any number of them.
     rng : None, int, SeedSequence, BitGenerator or Generator

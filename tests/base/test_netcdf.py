@@ -105,6 +105,17 @@ def test_existing_file_survives_a_failed_write(tmp_path, result, monkeypatch):
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_file_that_cannot_be_begun_leaves_nothing(tmp_path, result, monkeypatch):
+    def full(path, *_, **__):
+        path.write_bytes(b"begun")
+        raise OSError(28, "No space left")
+
+    monkeypatch.setattr(netCDF4, "Dataset", full)
+    with pytest.raises(InvalidInput, match="No space left"):
+        fc.save(result, tmp_path / "result.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
 def numbers(tree):
     return [
         (node.path, name, variable.dims, variable.values.tobytes())
