@@ -26,7 +26,8 @@ from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.netcdf import clear_partial, written_whole
 from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import encoded
-from fractalcontact.scenes._inputs import crack_options, locate
+from fractalcontact.scenes._inputs import locate
+from fractalcontact.scenes._options import crack_options, stage_options
 from fractalcontact.scenes._scene import Scene
 
 if TYPE_CHECKING:
@@ -179,7 +180,7 @@ def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tupl
     facts: dict[str, Any] = {
         "version": fractalcontact.__version__,
         "keep": [word for word in stage.keep if word not in dropped],
-        "options": row.options(scene, row),
+        "options": stage_options(scene, row),
     }
     if row.takes == "file":
         facts["surface"] = table = scene.table("surface" if stage.name == "surfaces" else "upper")

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-# arguments that a scene states elsewhere: surfaces, maps, what to keep, the material, progress bars
+# arguments that a scene states elsewhere: surfaces, maps, what to keep, progress bars
 FROM_SCENE = frozenset(
     (
         "surface",
@@ -19,9 +19,9 @@ FROM_SCENE = frozenset(
         "dilatancy",
         "keep",
         "progress",
-        "basic_friction_angle",
     )
 )
+MATERIAL_ALONE = "basic_friction_angle"  # of bodies: no table of a stage gives one of its own
 
 
 def public_function(name: str) -> Callable[..., Any]:
@@ -37,6 +37,6 @@ def parameters_of(function: str) -> dict[str, inspect.Parameter]:
 
 def arguments_of(function: str) -> tuple[tuple[str, ...], frozenset[str]]:
     """Return the arguments of a public function that a scene may give, and those without a default."""
-    allowed = {key: value for key, value in parameters_of(function).items() if key not in FROM_SCENE}
-    required = frozenset(key for key, value in allowed.items() if value.default is value.empty)
-    return tuple(allowed), required
+    known = {key: value for key, value in parameters_of(function).items() if key not in FROM_SCENE}
+    required = frozenset(key for key, value in known.items() if value.default is value.empty)
+    return tuple(key for key in known if key != MATERIAL_ALONE), required

@@ -1,4 +1,4 @@
-"""The input of a study: its surfaces, and the arguments of public functions that its tables stand for."""
+"""The surfaces of a study: read, made or generated as its tables state, and prepared."""
 
 from __future__ import annotations
 
@@ -13,25 +13,14 @@ import numpy as np
 
 from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.numbers import float_array
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.units import quantity_text
-from fractalcontact.scenes._functions import parameters_of, public_function
-from fractalcontact.scenes._scene import LOADS, OF_SURFACE, MaterialTable, Scene, SurfaceTable
-from fractalcontact.scenes._stage_type import StageType, loads_of, stage_options
+from fractalcontact.scenes._functions import public_function
+from fractalcontact.scenes._scene import OF_SURFACE, Scene, SurfaceTable
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# arguments that the material gives, and from what
-FROM_MATERIAL = {
-    "contact_modulus": ("young", "poisson"),
-    "poisson": ("poisson",),
-    "friction_coefficient": ("basic_friction_angle",),
-    "residual_friction_angle": ("basic_friction_angle",),
-    "basic_friction_angle": ("basic_friction_angle",),
-    "hardness": ("hardness",),
-}
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
 
 
@@ -154,87 +143,3 @@ def locate(path: str, folder: Path) -> Path:
         if candidate.is_file():
             return candidate
     raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
-
-
-def contact_modulus(material: MaterialTable) -> float:
-    """Return E* of the pair of bodies, Pa."""
-    from fractalcontact.contact import effective_modulus
-
-    return effective_modulus(*_bodies(material))
-
-
-def _bodies(material: MaterialTable) -> tuple[float, float, float, float]:
-    """Return young and poisson of the lower body, then of the upper one."""
-    young, poisson = np.broadcast_to(float_array(material.young), 2), float_array(material.poisson)
-    poisson = np.broadcast_to(poisson, 2)
-    return float(young[0]), float(poisson[0]), float(young[1]), float(poisson[1])
-
-
-def dimension_options(scene: Scene, row: StageType) -> dict[str, Any]:
-    """Return the arguments of `estimate`: the wanted methods, and those of `[dimensions]`."""
-    del row
-    return {"methods": list(scene.want.dimensions), **scene.table("dimensions")}
-
-
-def contact_options(scene: Scene, row: StageType | None = None) -> dict[str, Any]:
-    """Return the arguments of `press`: those of `[contact]`, then modulus and hardness of the material."""
-    del row
-    table, material = scene.table("contact"), scene.material
-    options = {key: value for key, value in table.items() if not isinstance(value, dict)}
-    if "contact_modulus" not in options and material.young is not None and material.poisson is not None:
-        options["contact_modulus"] = contact_modulus(material)
-    if material.hardness is not None:
-        options.setdefault("hardness", material.hardness)
-    return options
-
-
-def slip_options(scene: Scene, row: StageType) -> dict[str, Any]:
-    """Return the arguments of `partial_slip`: its own, those of `[contact]`, then those of the material."""
-    options, material, loads = stage_options(scene, row), scene.material, loads_of(scene, row)
-    options = {key: value for key, value in options.items() if key not in LOADS or key in loads}
-    pressed = contact_options(scene)
-    if "contact_modulus" in pressed:
-        options.setdefault("contact_modulus", pressed["contact_modulus"])
-    if isinstance(material.poisson, (int, float)):
-        options.setdefault("poisson", material.poisson)
-    elif material.poisson is not None and material.young is not None:
-        from fractalcontact.contact import effective_poisson
-
-        options.setdefault("poisson", effective_poisson(*_bodies(material)))
-    if material.basic_friction_angle is not None:
-        options.setdefault("friction_coefficient", math.tan(math.radians(material.basic_friction_angle)))
-    return options
-
-
-def crack_options(scene: Scene, row: StageType | None = None) -> dict[str, Any]:
-    """Return the arguments of `Crack` but for the surfaces; a stage may have a block of its own."""
-    material = scene.material
-    own = {} if row is None else scene.joint.stages.get(row.word, {})
-    options = {
-        "young": material.young,
-        "poisson": material.poisson,
-        "basic_friction_angle": material.basic_friction_angle,
-        "block": own.get("block", scene.joint.block),
-    }
-    return {key: value for key, value in options.items() if value is not None}
-
-
-def joint_options(scene: Scene, row: StageType) -> dict[str, Any]:
-    """Return the arguments of a stage of the joint but for its crack."""
-    own = scene.joint.stages.get(row.word, {})
-    options = {
-        key: value
-        for key, value in stage_options(scene, row).items()
-        if key != "block" and (key not in row.own or key in own)
-    }
-    if row.one_load:
-        loads = loads_of(scene, row)[:1]
-        options = {key: value for key, value in options.items() if key not in LOADS or key in loads}
-    angle, hardness = scene.material.basic_friction_angle, scene.material.hardness
-    if row.friction_angle and angle is not None:
-        options.setdefault(row.friction_angle, angle)
-    if "hardness" in row.arguments() and hardness is not None:
-        options.setdefault("hardness", hardness)
-    if "direction" in row.splits:
-        options.setdefault("direction", parameters_of(row.function)["direction"].default)
-    return {**options, **row.fixed}

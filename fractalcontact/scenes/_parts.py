@@ -26,14 +26,15 @@ from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.references import provenance_of
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._functions import public_function
-from fractalcontact.scenes._inputs import crack_options, read_surface
+from fractalcontact.scenes._functions import parameters_of, public_function
+from fractalcontact.scenes._inputs import read_surface
+from fractalcontact.scenes._options import call_options, crack_options, stage_options
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
-from fractalcontact.scenes._stage_type import StageType
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
     STAGES,
     Stage,
+    StageType,
     only_describes_surface,
     section_length,
 )
@@ -167,7 +168,7 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
         return works[stage.needs[0]]
     if stage.reads_map:
         return StageWork((partial(map_reader(stage, scene), results[stage.needs[0]]),))
-    row, options = stage.row, stage.row.call_options(scene, stage.keep)
+    row, options = stage.row, call_options(scene, stage.row, stage.keep)
     if stage.name == "surfaces":
         return StageWork((partial(_read_height, scene.surface, scene.folder),))
     if row.takes == "file":
@@ -179,7 +180,7 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
         return _split(stage, partial(call, row.function, surface), options, surface.size)
     if stage.name == "joints/delta_surface" and row.word not in scene.want.joints:
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
-    if stage.name == "joints/elastic_dilatancy":
+    if "joints/closure" in stage.needs:
         options |= _pressed(scene, results, options)
     crack = _crack(scene, results, row)
     nodes = crack.layout.cells[0] * crack.layout.cells[1]
@@ -188,7 +189,7 @@ def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str,
 
 def map_reader(stage: Stage, scene: Scene) -> MapReader:
     """Return the function of a map that a stage stands for."""
-    return MapReader(stage.row.function, stage.row.reads, stage.row.call_options(scene, stage.keep))
+    return MapReader(stage.row.function, stage.row.reads, call_options(scene, stage.row, stage.keep))
 
 
 def _read_height(table: SurfaceTable, folder: Path) -> xr.Dataset:
@@ -212,17 +213,17 @@ def _prepared(subpackage: str, scene: Scene, results: Results) -> xr.DataArray:
 
 def _split(stage: Stage, function: Part, options: Mapping[str, Any], nodes: int) -> StageWork:
     """Return the parts of a stage: a call for each value of the arguments that its row splits."""
-    pieces = [_pieces(dim, options, nodes) for dim in stage.row.splits]
+    pieces = [_pieces(dim, stage.row.function, options, nodes) for dim in stage.row.splits]
     apart = {name for piece in pieces for part in piece for name in part}
     common = {name: value for name, value in options.items() if name not in apart}
     parts = (partial(function, **common, **dict(ChainMap(*part))) for part in product(*pieces))
     return StageWork(tuple(parts), stage.row.splits, tuple(map(len, pieces)))
 
 
-def _pieces(dim: str, options: Mapping[str, Any], nodes: int) -> list[dict[str, Any]]:
+def _pieces(dim: str, function: str, options: Mapping[str, Any], nodes: int) -> list[dict[str, Any]]:
     """Return the arguments along one dim: one value each, or one section of the path of the load."""
     if dim != "step":
-        given = options[dim]
+        given = options[dim] if dim in options else parameters_of(function)[dim].default
         return [{dim: [value]} for value in (given if isinstance(given, (list, tuple)) else [given])]
     load = next(key for key in LOADS if key in options)
     path = options[load]
@@ -234,10 +235,8 @@ def _pieces(dim: str, options: Mapping[str, Any], nodes: int) -> list[dict[str, 
 
 def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict[str, xr.Dataset]:
     """Return the closure as the argument `pressed` of the elastic dilatancy, where both press alike."""
-    if "joints/closure" not in results:
-        return {}
-    row = STAGES["joints/closure"]
-    of_closure, free = row.options(scene, row), (*LOADS, "shear", "direction", "keep")
+    of_closure = stage_options(scene, STAGES["joints/closure"])
+    free = (*LOADS, "shear", "direction", "keep")
     own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
     alike = own == other and "normal_force" in of_closure
     return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}

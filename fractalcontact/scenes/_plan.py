@@ -17,17 +17,16 @@ from fractalcontact.base.memory import Plane, bytes_on, map_bytes, require_memor
 from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._functions import arguments_of, public_function
-from fractalcontact.scenes._inputs import FROM_MATERIAL, block_shape, generator_options, surface_grid
+from fractalcontact.scenes._inputs import block_shape, generator_options, surface_grid
+from fractalcontact.scenes._options import FROM_MATERIAL, call_options, given_options, loads_of, values_of
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stage_type import StageType, loads_of, stage_options
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
-    CURVES,
     FIGURES,
     ISLAND_MAP,
-    READ_THE_GAP,
     STAGES,
     Stage,
+    StageType,
     section_length,
 )
 
@@ -113,7 +112,7 @@ def stages_of(scene: Scene) -> tuple[Stage, ...]:
             reasons[name],
             keep=_kept_maps(scene, row),
             stored=name != "surfaces" or reasons[name] != "input",
-            whole_path=row.whole_path or "total_stress" in stage_options(scene, row, ("total_stress",)),
+            whole_path=row.whole_path or (row.takes == "map" and "total_stress" in values_of(scene, row)),
         )
         for name, row in STAGES.items()
         if name in reasons
@@ -128,38 +127,25 @@ def _reasons(scene: Scene) -> dict[str, str]:
     """Return the names of the stages that the wanted results need, each with the reason."""
     want = scene.want
     reasons = {"surfaces": "figures are wanted" if want.figures else "input"}
-    for row in STAGES.values():
-        table, _, word = row.wanted.partition(".")
-        if word and word in getattr(want, table):
-            reasons[row.name] = f"{word} is wanted"
     if want.dimensions:
         reasons["dimensions"] = f"wanted: {', '.join(want.dimensions)}"
-        if want.figures:
-            curves = [name for name in want.dimensions if name in CURVES]
-            reasons |= {f"dimensions/{name}": "figures are wanted" for name in curves}
-    _add_joint_reasons(scene, reasons)
+    for row in STAGES.values():
+        table, _, word = row.wanted.partition(".")
+        if word and word in getattr(want, table) and (want.figures or not row.for_figures):
+            reasons[row.name] = "figures are wanted" if row.for_figures else f"{word} is wanted"
+    # from the last stage to the first, so that what a needed one needs is there too
+    for row in reversed(tuple(STAGES.values())):
+        for need in row.needs if row.name in reasons and row.takes in ("map", "result") else ():
+            *_, last = names = need.split(" or ")
+            if reasons.keys().isdisjoint(names):
+                reasons[last] = row.why
+    if any(STAGES[name].group == "joints" for name in reasons):
+        if want.figures and "shear" in values_of(scene, STAGES["joints/delta_surface"]):
+            reasons.setdefault("joints/delta_surface", "figures are wanted")
+        if scene.upper is not None:
+            registered = " and registered" if scene.joint.register else ""
+            reasons["joints/faces"] = f"an upper face is given{registered}"
     return reasons
-
-
-def _add_joint_reasons(scene: Scene, reasons: dict[str, str]) -> None:
-    """Add the stages of a joint that other stages need."""
-    want = scene.want
-    if want.domains and not scene.is_pressed:
-        reasons.setdefault("joints/closure", "the contact set is analysed")
-    for name in READ_THE_GAP:
-        if name in want.joints:
-            reasons.setdefault("joints/closure", f"{name} needs the gap")
-    if "closure_laws" in want.joints:
-        reasons.setdefault("joints/closure", "closure_laws needs it")
-    if "friction" in want.joints and "elastic_dilatancy" not in want.joints:
-        reasons.setdefault("joints/rigid_dilatancy", "friction needs a dilatancy")
-    if not any(STAGES[name].group == "joints" for name in reasons):
-        return
-    if want.figures and stage_options(scene, STAGES["joints/delta_surface"], ("shear",)):
-        reasons.setdefault("joints/delta_surface", "figures are wanted")
-    if scene.upper is not None:
-        registered = " and registered" if scene.joint.register else ""
-        reasons["joints/faces"] = f"an upper face is given{registered}"
 
 
 def _needs(row: StageType, planned: dict[str, str]) -> tuple[str, ...]:
@@ -183,7 +169,8 @@ def _kept_maps(scene: Scene, row: StageType) -> tuple[str, ...]:
     reads_state = is_contact == scene.is_pressed and bool(scene.want.domains)
     if (reads_state or scene.want.figures) and "state" not in maps:
         maps.append("state")
-    if set(READ_THE_GAP) & set(scene.want.joints) and not is_contact and "gap" not in maps:
+    reads_gap = any(STAGES[f"joints/{word}"].reads == "gap" for word in scene.want.joints)
+    if reads_gap and not is_contact and "gap" not in maps:
         maps.append("gap")
     return tuple(maps)
 
@@ -195,13 +182,13 @@ def check_needs(scene: Scene, problems: Problems) -> None:
         row, name, reason = stage.row, stage.row.word or stage.name, stage.reason
         if not row.table or row.takes == "file":
             continue
-        options = stage_options(scene, row)
-        for key in (*row.needed(), *filter(None, [row.friction_angle])):
-            sources = FROM_MATERIAL.get(key, ())
+        options = given_options(scene, row)
+        for key in row.needed():
+            sources, _ = FROM_MATERIAL.get(key, ((), None))
             if key in options or (sources and material >= set(sources)):
                 continue
             place = "joint" if key in (*LOADS, "shear", "block") else row.table
-            if key == row.friction_angle:
+            if key.endswith("friction_angle"):
                 place, key, sources = "material", "basic_friction_angle", ()
             elsewhere = f", or {' and '.join(sources)} in [material]" if sources else ""
             problems.add(f"{place}.{key}", f"a value for {name} ({reason}){elsewhere}", NONE)
@@ -247,7 +234,7 @@ def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
             continue
         takes = stage.row.takes
         plane = surface if takes == "surface" or (takes == "map" and scene.is_pressed) else block
-        options = stage.row.call_options(scene, stage.keep)
+        options = call_options(scene, stage.row, stage.keep)
         steps, shears = _count(options, LOADS), _count(options, ("shear",))
         section = section_length(steps, int(plane.cells), has_hardness="hardness" in options)
         planes = section if stage.reads_part else steps * shears if stage.reads_map else 1

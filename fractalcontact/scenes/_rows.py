@@ -400,9 +400,9 @@ def _at_pressures(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield what the criteria assume, and where they are used outside their range."""
     if "assumption" in data:
         names = [str(name) for name in data["criterion"].values]
-        yield from (
-            f"{name}: {text}" for name, text in zip(names, data["assumption"].values, strict=True) if text
-        )
+        texts = np.atleast_2d(data["assumption"].transpose(..., "criterion").values)  # of every member
+        lines = (f"{name}: {text}" for row in texts for name, text in zip(names, row, strict=True) if text)
+        yield from dict.fromkeys(lines)
 
 
 strength_envelope = rows(

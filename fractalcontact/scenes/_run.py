@@ -30,6 +30,7 @@ from fractalcontact.scenes._executor import Workers, worker_processes, workers_o
 from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, pictured, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
+from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import PARTIAL, ScanStudies
 from fractalcontact.scenes._scene import Scene
@@ -37,7 +38,7 @@ from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Ensemble, Study
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._tables import tables
-from fractalcontact.scenes._validation import implausible_result, validate, warn
+from fractalcontact.scenes._validation import validate
 
 OWN_REFERENCES = "see the references of each group"
 # what the root of a result states of its groups, for a reader that opens no group

@@ -101,7 +101,6 @@ class WantTable:
 
 
 MATERIAL_KEYS = tuple(entry.name for entry in fields(MaterialTable))
-WANT_KEYS = tuple(entry.name for entry in fields(WantTable))
 
 
 @dataclass(frozen=True, repr=False)
@@ -178,10 +177,10 @@ class Scene:
         """The wanted results."""
         table = self.table("want")
         figures, datasheet = (table.get(key, False) is True for key in ("figures", "datasheet"))
-        own = [key for key in WANT_KEYS if key in table and key not in ("figures", "datasheet")]
-        words = {key: self.wanted(key) for key in own}
+        lists = ("surfaces", "dimensions", "contact", "joints", "domains", "keep")
+        words = {key: self.wanted(key) for key in lists}
         if datasheet:
-            words["joints"] = tuple(dict.fromkeys((*words.get("joints", ()), *DATASHEET)))
+            words["joints"] = tuple(dict.fromkeys((*words["joints"], *DATASHEET)))
         return WantTable(**words, figures=figures, datasheet=datasheet)
 
     @property

@@ -264,10 +264,9 @@ def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> Non
 def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     material = scene.table("material")
-    # the block falls on rigid faces where the material has no elastic constants
-    rigid = set() if {"young", "poisson"} & set(material) else {"joints/self_weight"}
-    planned = [stage.row for stage in stages_of(scene) if stage.name not in rigid]
-    if any(row.presses and row.takes == "crack" for row in planned):
+    is_elastic = bool({"young", "poisson"} & set(material))
+    pressing = [stage.row for stage in stages_of(scene) if stage.row.presses and stage.row.takes == "crack"]
+    if any(is_elastic or not row.may_be_rigid for row in pressing):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
     slips = PARTIAL_SLIP in (*scene.wanted("contact"), *scene.wanted("joints"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from fractalcontact.base.compass import AZIMUTHS, LARGEST_AZIMUTH
@@ -12,9 +12,15 @@ from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.units import PRESSURE
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import arguments_of
-from fractalcontact.scenes._scene import LOADS, OF_SURFACE, WANT_KEYS, Table
-from fractalcontact.scenes._stage_type import StageType
-from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, PARTIAL_SLIP, STAGES, WANTED
+from fractalcontact.scenes._scene import LOADS, OF_SURFACE, Table
+from fractalcontact.scenes._stages import (
+    DOMAIN_STAGES,
+    JOINT_STAGES,
+    PARTIAL_SLIP,
+    STAGES,
+    WANTED,
+    StageType,
+)
 
 Schema = dict[str, Any]
 
@@ -23,7 +29,26 @@ SAMPLES = (
     "concrete_crack", "jacksboro_fault_dem", "freiberg_gneiss_side_a", "freiberg_gneiss_side_b",
     "afm_10um_di3", "wli_126um_opd1",
 )  # fmt: skip
-TABLES = ("surface", "upper", "material", "contact", "joint", "dimensions", "domains", "want")
+TABLES = {
+    "surface": "The lower face, or the only surface: one of read, sample, generate.",
+    "upper": "The upper face of a joint; without it the two faces match.",
+    "material": "Both bodies. young and poisson are one value, or [lower, upper].",
+    "contact": "A surface pressed by a flat: the arguments of fractalcontact.contact.press.",
+    "joint": "Two faces: the block that slides, and arguments that several stages share.",
+    "dimensions": "The arguments of fractalcontact.dimensions.estimate.",
+    "domains": "The analysis of the set of true contacts, one table for each function.",
+    "want": "The wanted results; only what they need is computed.",
+}
+WANT = {
+    "surfaces": "Results about the surface.",
+    "dimensions": 'Estimators of fractal dimension: "default" or names of `fractalcontact methods`.',
+    "contact": "Results of the surface pressed by a flat.",
+    "joints": "Results of the joint.",
+    "domains": "Results about the set of true contacts.",
+    "keep": "Maps to store.",
+    "figures": "Draw figures.",
+    "datasheet": "Write datasheet.pdf, one page about a joint, and its curves as CSV files.",
+}
 EVEN, LOGARITHMIC = ("start", "stop", "step"), ("first", "last", "count")
 LONGEST_RANGE = 1_000_000  # entries of a range, members of an ensemble: more are a slip of the pen
 # arguments in Pa, which may have their unit, and words for others
@@ -45,10 +70,18 @@ RANGES = [{"$ref": "#/definitions/even_range"}, {"$ref": "#/definitions/logarith
 
 @dataclass(frozen=True)
 class Kind:
-    """What the value of a key may be: its check, called with problems, place and value, and its schema."""
+    """What the value of a key may be: its check, called with problems, place and value, and its schema.
+
+    `text` describes the key, where the docstring of the function that takes the value does not.
+    """
 
     check: Callable[[Problems, str, Any], object]
     schema: Schema = field(default_factory=dict)
+    text: str = ""
+
+    def about(self, text: str) -> Kind:
+        """Return this kind with the description of a key."""
+        return replace(self, text=text)
 
 
 def _kind(check: Callable[..., object], schema: Schema, *arguments: Any, **options: Any) -> Kind:
@@ -103,11 +136,15 @@ def _check_files(problems: Problems, place: str, value: Any) -> None:
     problems.require(bool(files), place, "a file, a pattern or a list of files", files)
 
 
-def _check_direction(problems: Problems, place: str, value: Any) -> None:
+def _check_directions(problems: Problems, place: str, value: Any) -> None:
     for direction in value if isinstance(value, list) else [value]:
-        is_azimuth = isinstance(direction, (int, float)) and not isinstance(direction, bool)
-        valid = direction in COMPASS or (is_azimuth and abs(direction) < LARGEST_AZIMUTH)
-        problems.require(valid, place, f"one of {', '.join(COMPASS)}, or an azimuth in degrees", direction)
+        _check_direction(problems, place, direction)
+
+
+def _check_direction(problems: Problems, place: str, value: Any) -> None:
+    is_azimuth = isinstance(value, (int, float)) and not isinstance(value, bool)
+    valid = value in COMPASS or (is_azimuth and abs(value) < LARGEST_AZIMUTH)
+    problems.require(valid, place, f"one of {', '.join(COMPASS)}, or an azimuth in degrees", value)
 
 
 def _check_value(problems: Problems, place: str, value: Any) -> None:
@@ -133,40 +170,52 @@ _FILE = {"type": "string", "minLength": 1}
 ANYTHING, VALUE = Kind(_unchecked), Kind(_check_value)
 FLAG = Kind(Problems.boolean, {"type": "boolean"})
 FILES = Kind(_check_files, {"anyOf": [_FILE, {"type": "array", "minItems": 1, "items": _FILE}]})
+DIRECTION = Kind(_check_direction, _DIRECTION)
 TITLE = Kind(
     lambda problems, place, value: problems.require(isinstance(value, str), place, "words", value),
     {"type": "string"},
+    "Title of the study.",
 )
 # arguments that several functions share; their other ones are checked by the functions alone
 SHARED = {
     **dict.fromkeys(("contact_modulus", "hardness", "seating_pressure"), number(unit=True, above=0.0)),
     **dict.fromkeys(("smoothing", "distance", "viscosity", "unit_weight"), number(above=0.0)),
     "tolerance": number(above=0.0, below=1.0),
-    **dict.fromkeys(("block", "spacing", "structure_size"), _numbers(above=0.0)),
+    "block": _numbers(above=0.0).about("Edges of the upper block, m."),
+    **dict.fromkeys(("spacing", "structure_size"), _numbers(above=0.0)),
     **{key: _numbers(unit=key in PRESSURES, at_least=0.0) for key in ("shear", *LOADS)},
-    "direction": Kind(_check_direction, {"anyOf": [_DIRECTION, {"type": "array", "items": _DIRECTION}]}),
+    "direction": Kind(_check_directions, {"anyOf": [_DIRECTION, {"type": "array", "items": _DIRECTION}]}),
 }
+LEVEL = _integer(at_least=0).about("Remove the least-squares polynomial of this degree.")
 OF_FILES = {
     "channel": ANYTHING,
     "units": _choice(UNITS),
     "spacing": SHARED["spacing"],
-    **dict.fromkeys(("first_row", "columns", "plane"), ANYTHING),
-    "level": _integer(at_least=0),
-    **dict.fromkeys(("despike", "fill"), FLAG),
+    **dict.fromkeys(("first_row", "columns"), ANYTHING),
+    "plane": ANYTHING.about(
+        'Of points: "fit", "xy"; of [upper] also "surface", the plane and cells of [surface].'
+    ),
+    "level": LEVEL,
+    "despike": FLAG.about("Remove points that stand out from all around them; roughness keeps them."),
+    "fill": FLAG.about("Fill small gaps with the smoothest surface."),
 }
 PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
 MATERIAL = {
-    "young": _numbers(unit=True, pair=True, above=0.0),
-    "poisson": _numbers(pair=True, above=-1.0, at_most=0.5),
-    "basic_friction_angle": number(at_least=0.0, below=90.0),
-    "hardness": SHARED["hardness"],
-    "yield_pressure": _numbers(unit=True, above=0.0),
+    "young": _numbers(unit=True, pair=True, above=0.0).about("Young's modulus, Pa."),
+    "poisson": _numbers(pair=True, above=-1.0, at_most=0.5).about("Poisson's ratio."),
+    "basic_friction_angle": number(at_least=0.0, below=90.0).about("Friction angle of smooth faces, degree."),
+    "hardness": SHARED["hardness"].about("Largest pressure, Pa; beyond it the bodies yield."),
+    "yield_pressure": _numbers(unit=True, above=0.0).about(
+        "Pressure that the true pressures are compared with, Pa; changes no result."
+    ),
 }
 OF_JOINT = {
-    "register": FLAG,
-    "turn_upper": _choice(("x", "y")),
-    "lower": FILES,
-    "upper": FILES,
+    "register": FLAG.about("Bring two measured faces into mated position first."),
+    "turn_upper": _choice(("x", "y")).about(
+        "The axis about which an upper body that was scanned face up is turned over."
+    ),
+    "lower": FILES.about("Files of the lower faces, as read of [surface]."),
+    "upper": FILES.about("Files of the upper faces, as read of [upper]; wildcards pair them."),
 }
 
 
@@ -181,10 +230,15 @@ class Keys:
 
 def surface_forms(place: str) -> dict[str, Keys]:
     """Return the keys of `[surface]` or `[upper]` by its source: `read`, `sample`, or the generator."""
-    plane = {"plane": _choice(PLANES[place])}
+    plane = {"plane": _choice(PLANES[place]).about(OF_FILES["plane"].text)}
+    read = FILES.about(
+        "A file, relative to the scene, of every format of fractalcontact.surfaces.read; of many scans a "
+        "pattern (scans/*.sur) or a list."
+    )
+    sample = _choice(SAMPLES).about("A surface that is installed with the package.")
     forms = {
-        "read": Keys({"read": FILES} | OF_FILES | plane, ("read",)),
-        "sample": Keys({"sample": _choice(SAMPLES)} | OF_FILES, ("sample",)),
+        "read": Keys({"read": read} | OF_FILES | plane, ("read",)),
+        "sample": Keys({"sample": sample} | OF_FILES, ("sample",)),
     }
     for name in GENERATORS:
         keys, required = arguments_of(f"surfaces.{name}")
@@ -192,7 +246,10 @@ def surface_forms(place: str) -> dict[str, Keys]:
         kinds["shape"] = Kind(_check_shape, {"type": "array", "minItems": 2, "maxItems": 2})
         if "members" in kinds:
             kinds["members"] = _integer(at_least=1, at_most=LONGEST_RANGE)
-        kinds |= {"generate": Kind(_unchecked, {"const": name}), "level": OF_FILES["level"]}
+        if "direction" in kinds:
+            kinds["direction"] = DIRECTION
+        text = "A synthetic surface; the other keys are the arguments of this function."
+        kinds |= {"generate": Kind(_unchecked, {"const": name}, text), "level": LEVEL}
         forms[name] = Keys(kinds, ("generate", *sorted(required)))
     return forms
 
@@ -211,11 +268,12 @@ def keys_of(table: str, given: Table | None = None) -> Keys:
 
             methods = ("default", *dimensions.methods(), *SPELLINGS["dimensions"])
         words = {**WANTED, "dimensions": methods}
-        return Keys({key: _choices(words[key]) if key in words else FLAG for key in WANT_KEYS})
+        kinds = {key: (_choices(words[key]) if key in words else FLAG).about(WANT[key]) for key in WANT}
+        return Keys(kinds)
     if table == "dimensions":  # its methods are those of [want]
-        return Keys(_arguments(key for key in arguments_of("dimensions.estimate")[0] if key != "methods"))
+        return Keys(_arguments(key for key in STAGES[table].arguments() if key != "methods"))
     if table == "contact":
-        return Keys(_arguments(arguments_of("contact.press")[0]), (), {PARTIAL_SLIP: STAGES[PARTIAL_SLIP]})
+        return Keys(_arguments(STAGES[table].arguments()), (), {PARTIAL_SLIP: STAGES[PARTIAL_SLIP]})
     if table == "domains":
         return Keys({}, (), {name: STAGES[f"domains/{name}"] for name in DOMAIN_STAGES})
     stages = {name: STAGES[f"joints/{name}"] for name in JOINT_STAGES}

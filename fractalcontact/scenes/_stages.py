@@ -1,19 +1,20 @@
-"""The stages of a study as one static table: what each needs, its public function, the maps it reads.
+"""The stages of a study as one static table: what each needs, its public function, its maps, its rows.
 
-The rows stand in an order in which they can run. `_plan` selects the rows that the wanted results of a scene
-need, `_parts` carries them out.
+The rows stand in an order in which they can run. `_plan` selects those that the wanted results of a scene
+need, `_options` gives the arguments of their calls, `_parts` carries them out, `_rows` has the tables of the
+results.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
-from fractalcontact.scenes import _inputs, _rows
+from fractalcontact.scenes import _rows
+from fractalcontact.scenes._functions import arguments_of, parameters_of
 from fractalcontact.scenes._result_tables import Rows
 from fractalcontact.scenes._scene import LOADS, PRESS, Scene
-from fractalcontact.scenes._stage_type import StageType, stage_options
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
@@ -21,20 +22,123 @@ PARTIAL_SLIP = "partial_slip"
 FIGURES = "figures"
 PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 
+
+@dataclass(frozen=True)
+class StageType:
+    """One row of the table of stages.
+
+    Attributes
+    ----------
+    name : str
+        Group of its result, "joints/closure" for example.
+    needs : tuple of str
+        Stages whose results it takes, where the study has them; of "a or b" the first that the study has. A
+        stage that takes a map or a result brings the last of them into the study, if it has none.
+    function : str
+        The public function that computes it, for example "joints.closure".
+    table : str
+        Table of the scene with the arguments of the function.
+    wanted : str
+        List and word of `[want]` that ask for it, "joints.closure" for example.
+    takes : {"surface", "crack", "map", "result", "file", "study"}
+        The first argument of the function: the lower face, the crack, a map or the whole result of the stage
+        it needs, a file of the scene, or all results.
+    why : str
+        Why it needs another stage, for the plan.
+    for_figures : bool
+        It is computed only where figures are wanted.
+    reads : str
+        The map that it reads from the stage it needs.
+    keeps : tuple of str
+        The maps that it can store.
+    splits : tuple of str
+        Arguments whose values are computed apart, each by a call of its own (a part of the stage) that may
+        run anywhere; "step" is the path of the load, cut into sections.
+    rows : Rows, optional
+        The table of its result in the summary and the report.
+    whole_path : bool
+        It follows the contact set along the load path, or measures all states over one window of lengths, and
+        reads the maps of all steps at once. A scene can ask that of other stages too, see `Stage.whole_path`.
+    presses : bool
+        It solves a contact: it needs elastic constants, and which loads are possible depends on the heights.
+    may_be_rigid : bool
+        It computes rigid faces where the material has no elastic constants.
+    one_load, one_direction : bool
+        It takes one path of load, one direction.
+    keys, own : tuple of str
+        The arguments that a scene may give, where they are not all of the function; and those of them that
+        only its own table gives.
+    required : tuple of str
+        Arguments that a scene must give beside those without a default.
+    fixed : mapping
+        Arguments that no scene gives.
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    function: str
+    table: str = ""
+    wanted: str = ""
+    takes: Literal["surface", "crack", "map", "result", "file", "study"] = "surface"
+    why: str = ""
+    for_figures: bool = False
+    reads: str = ""
+    keeps: tuple[str, ...] = ()
+    splits: tuple[str, ...] = ()
+    rows: Rows | None = None
+    whole_path: bool = False
+    presses: bool = False
+    may_be_rigid: bool = False
+    one_load: bool = False
+    one_direction: bool = False
+    keys: tuple[str, ...] = ()
+    own: tuple[str, ...] = ()
+    required: tuple[str, ...] = ()
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def subpackage(self) -> str:
+        """The subpackage that holds the function."""
+        return self.function.partition(".")[0]
+
+    @property
+    def group(self) -> str:
+        """The group of the result in which it stands, "joints" for example."""
+        return self.name.partition("/")[0]
+
+    @property
+    def word(self) -> str:
+        """The name without its group."""
+        return self.name.partition("/")[2]
+
+    def arguments(self) -> tuple[str, ...]:
+        """Return the arguments of the function that a scene may give."""
+        return self.keys or arguments_of(self.function)[0]
+
+    def needed(self) -> tuple[str, ...]:
+        """Return the arguments that a scene must give."""
+        without_default = arguments_of(self.function)[1]
+        known = self.keys or parameters_of(self.function)
+        return (*self.required, *(key for key in known if key in without_default))
+
+
 _SURFACE = ("surfaces",)
 _FACES = ("surfaces", "joints/faces")
 
 
 def _curve(method: str) -> StageType:
-    return StageType(f"dimensions/{method}", _SURFACE, f"dimensions.{method}")
+    name = f"dimensions.{method}"
+    return StageType(f"dimensions/{method}", _SURFACE, name, wanted=name, for_figures=True)
 
 
 def _joint(
     name: str, rows: Rows | None, needs: tuple[str, ...] = _FACES, function: str = "", **more: Any
 ) -> StageType:
-    words: dict[str, Any] = {"takes": "crack", "options": _inputs.joint_options} | more
-    word, function = f"joints.{name}", f"joints.{function or name}"
-    return StageType(f"joints/{name}", needs, function, f"joint.{name}", word, rows=rows, **words)
+    options: dict[str, Any] = {"takes": "crack"} | more
+    function = f"joints.{function or name}"
+    return StageType(
+        f"joints/{name}", needs, function, f"joint.{name}", f"joints.{name}", rows=rows, **options
+    )
 
 
 def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
@@ -42,14 +146,14 @@ def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
 
 
 def _of_gap(name: str, rows: Rows) -> StageType:
-    return _joint(name, rows, ("joints/closure",), takes="map", reads="gap", options=stage_options)
+    return _joint(name, rows, ("joints/closure",), takes="map", reads="gap", why=f"{name} needs the gap")
 
 
 def _domain(name: str, rows: Rows | None = None, **more: Any) -> StageType:
     source = ("contact or joints/closure",)
-    table = f"domains.{name}"
+    table, why = f"domains.{name}", "the contact set is analysed"
     return StageType(
-        f"domains/{name}", source, table, table, table, takes="map", reads="state", rows=rows, **more
+        f"domains/{name}", source, table, table, table, "map", why, reads="state", rows=rows, **more
     )
 
 
@@ -62,14 +166,7 @@ _ROWS = (
     StageType(
         "surfaces/texture", _SURFACE, "surfaces.texture", wanted="surfaces.texture", rows=_rows.texture
     ),
-    StageType(
-        "dimensions",
-        _SURFACE,
-        "dimensions.estimate",
-        "dimensions",
-        options=_inputs.dimension_options,
-        rows=_rows.dimensions,
-    ),
+    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions", rows=_rows.dimensions),
     _curve("spectrum"),
     _curve("variogram"),
     _curve("cube_counts"),
@@ -85,7 +182,6 @@ _ROWS = (
         "contact.press",
         "contact",
         f"contact.{PRESS}",
-        options=_inputs.contact_options,
         keeps=CONTACT_MAPS,
         splits=("step",),
         presses=True,
@@ -99,7 +195,6 @@ _ROWS = (
         "contact.partial_slip",
         "contact.partial_slip",
         f"contact.{PARTIAL_SLIP}",
-        options=_inputs.slip_options,
         keeps=SLIP_MAPS,
         presses=True,
         one_load=True,
@@ -115,6 +210,7 @@ _ROWS = (
         _rows.closure_laws,
         ("joints/closure",),
         takes="result",
+        why="closure_laws needs it",
         keys=("seating_pressure",),  # its closure is the result of another stage, not a load
     ),
     _joint(
@@ -145,6 +241,7 @@ _ROWS = (
         _rows.friction,
         ("joints/elastic_dilatancy or joints/rigid_dilatancy",),
         takes="result",
+        why="friction needs a dilatancy",
         own=("nominal_pressure",),  # in [joint] it is the load of the closure
     ),
     _of_surface("roughness_coefficient", _rows.roughness_coefficient),
@@ -152,16 +249,9 @@ _ROWS = (
     _joint(
         "direct_shear", _rows.direct_shear, splits=("nominal_pressure",), one_direction=True, presses=True
     ),
-    _of_surface(
-        "shear_curve", _rows.shear_curve, one_direction=True, friction_angle="residual_friction_angle"
-    ),
-    _of_surface(
-        "strength_envelope",
-        _rows.strength_envelope,
-        one_direction=True,
-        friction_angle="basic_friction_angle",
-    ),
-    _joint("self_weight", _rows.self_weight, presses=True),
+    _of_surface("shear_curve", _rows.shear_curve, one_direction=True),
+    _of_surface("strength_envelope", _rows.strength_envelope, one_direction=True),
+    _joint("self_weight", _rows.self_weight, presses=True, may_be_rigid=True),
     _joint("decorrelation_length", _rows.decorrelation_length, one_direction=True),
     _of_gap("transmissivity", _rows.transmissivity),
     _of_gap("uplift", _rows.uplift),
@@ -185,8 +275,6 @@ _ROWS = (
 STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}
 
 
-CURVES = tuple(row.word for row in _ROWS if row.group == "dimensions" and row.word)
-READ_THE_GAP = tuple(row.word for row in _ROWS if row.reads == "gap")
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
     name: tuple(word for table, _, word in (row.wanted.partition(".") for row in _ROWS) if table == name)

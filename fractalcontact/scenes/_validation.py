@@ -25,33 +25,17 @@ from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes import _inputs
 from fractalcontact.scenes._functions import arguments_of, parameters_of, public_function
+from fractalcontact.scenes._options import call_options, crack_options, stage_options
 from fractalcontact.scenes._plan import stages_of
+from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scene import LOADS, PRESS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import check_tables, parse
 from fractalcontact.scenes._scene_keys import GENERATORS
-from fractalcontact.scenes._stage_type import StageType
-from fractalcontact.scenes._stages import (
-    DOMAIN_STAGES,
-    JOINT_STAGES,
-    STAGES,
-    WANTED,
-    Stage,
-)
+from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, STAGES, WANTED, Stage, StageType
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
-import warnings
-from collections.abc import Iterable
-from typing import TYPE_CHECKING
-
-from fractalcontact.base.errors import ScaleWarning
-from fractalcontact.base.grid import distinct
-from fractalcontact.scenes._inputs import contact_modulus, contact_options
-from fractalcontact.scenes._stage_type import stage_options
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make
 LARGE = 1 << 18  # points of a generated surface that is not made twice
@@ -259,7 +243,7 @@ def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Prob
 def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], row: StageType | None = None) -> Crack:
     """Return the crack of the scene, or that of a stage with a block of its own."""
     faces = surfaces["surface"], surfaces.get("upper")
-    crack: Crack = public_function("joints.Crack")(*faces, **_inputs.crack_options(scene, row))
+    crack: Crack = public_function("joints.Crack")(*faces, **crack_options(scene, row))
     return crack
 
 
@@ -273,7 +257,7 @@ def _own_crack(
 
 
 def _validate_travel(crack: Crack, stage: Stage, scene: Scene, problems: Problems) -> None:
-    options = stage.row.options(scene, stage.row)
+    options = stage_options(scene, stage.row)
     if "shear" not in options:
         return
     directions = options.get("direction", parameters_of(stage.row.function)["direction"].default)
@@ -302,7 +286,7 @@ def _validate_calls(
                 subject = _own_crack(scene, surfaces, crack, row, problems)
             elif row.takes == "map":
                 subject = _empty_maps(scene, surface, crack, row)
-            _validate_call(row.function, subject, **row.call_options(scene, stage.keep))
+            _validate_call(row.function, subject, **call_options(scene, row, stage.keep))
 
 
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
@@ -321,8 +305,7 @@ def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
     rows, columns = crack.layout.slices
     block = crack.lower.isel(y=rows, x=columns)
     gap = block.copy(data=np.broadcast_to(0.0, block.shape))
-    row = STAGES["joints/closure"]
-    options = row.options(scene, row)
+    options = stage_options(scene, STAGES["joints/closure"])
     path = next((real_numbers(options[key]) for key in LOADS if key in options), None)
     if path is None or path.ndim > 1:  # a problem of the closure, which is listed there
         path = np.zeros(1)
@@ -343,68 +326,3 @@ def _empty_maps(
     periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
     maps = _zeros(cells, spacing, periodic)
     return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)
-
-
-LARGEST_SLOPE = 3.0  # rms slope: cracks, grounds and grinds are below 1
-LARGEST_STRAIN = 0.3  # mean pressure over the contact modulus, where strains are no longer small
-LARGEST_CLOSURE = 0.5  # closure over the edge of the body
-
-
-def warn(messages: Iterable[str]) -> None:
-    """Warn of every implausible value."""
-    for message in messages:
-        warnings.warn(message, ScaleWarning, stacklevel=3)
-
-
-def _rms_slope(heights: np.ndarray[Any, Any], spacing: tuple[float, float]) -> float:
-    squares = [
-        np.nanmean((np.diff(heights, axis=axis) / spacing[axis]) ** 2)
-        for axis in (0, 1)
-        if heights.shape[axis] > 1
-    ]
-    return float(np.sqrt(np.sum(squares)))
-
-
-def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
-    """Yield the implausible values of a scene and its surface."""
-    spacing = _inputs.spacing_of(surface)
-    slope = _rms_slope(distinct(surface.values), spacing)
-    if slope > LARGEST_SLOPE:
-        yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
-    edges = [size * step for size, step in zip(surface.shape, spacing, strict=True)]
-    if scene.is_pressed:
-        options = contact_options(scene)
-        yield from _high_pressures(
-            "contact", options, float(np.prod(edges)), float(options["contact_modulus"])
-        )
-    material = scene.material
-    stages = [
-        name for name in ("closure", "area_dimension", "elastic_dilatancy") if name in scene.want.joints
-    ]
-    if stages and material.young is not None and material.poisson is not None:
-        modulus = contact_modulus(material)
-        block = edges if scene.joint.block is None else scene.joint.block
-        area = float(np.prod(np.broadcast_to(block, 2)))
-        for name in stages:
-            loads = stage_options(scene, STAGES[f"joints/{name}"], ("normal_force", "nominal_pressure"))
-            yield from _high_pressures(f"joint.{name}", loads, area, modulus)
-
-
-def _high_pressures(place: str, loads: Mapping[str, Any], area: float, modulus: float) -> Iterator[str]:
-    for key, scale in (("normal_force", area), ("nominal_pressure", 1.0)):
-        if loads.get(key) is not None:
-            highest = float(np.max(loads[key])) / scale
-            if highest > LARGEST_STRAIN * modulus:
-                yield (
-                    f"{place}: {key} gives a mean pressure of {highest:.3g} Pa on a contact modulus of "
-                    f"{modulus:.3g} Pa; is one of them in another unit?"
-                )
-
-
-def implausible_result(name: str, result: xr.Dataset) -> Iterator[str]:
-    """Yield the implausible values of a closure law."""
-    edge = float(result["nominal_area"].max()) ** 0.5
-    if "closure" in result and np.isfinite(result["closure"].values).any():
-        deepest = float(np.nanmax(result["closure"].values))
-        if deepest > LARGEST_CLOSURE * edge:
-            yield f"{name}: a closure of {deepest:.3g} m of a body {edge:.3g} m wide; is the modulus in Pa?"

@@ -116,6 +116,13 @@ def test_plain_mistakes_are_seen_by_the_schema(path, value):
     assert not fits(changed(scene("new_scene"), path, value))
 
 
+def test_surface_has_one_direction(tmp_path):
+    tables = scene("pressed_surface")
+    for value, valid in (("N", True), (30.0, True), (["E", "N"], False)):
+        other = changed(tables, ("surface", "direction"), value)
+        assert fits(other) == is_loaded(other, tmp_path) == valid
+
+
 def test_new_and_printed_scenes_fit(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["init"]) == 0

@@ -48,6 +48,16 @@ def scene(tmp_path):
     return write
 
 
+def test_criteria_of_an_ensemble_state_their_assumptions_once(scene, tmp_path):
+    text = SCENE.replace("rng = 3", "rng = 3\nmembers = 2").replace('"direct_shear", "shear_curve", ', "")
+    tree = fc.scenes.run(scene(text.replace("figures = true", "")), out=tmp_path / "out", progress=False)
+    whole = fc.scenes.summary(tree, verbose=True)
+    texts = {text for text in tree["joints/strength_envelope/assumption"].values.ravel() if text}
+    assert texts
+    for text in texts:
+        assert " ".join(whole.split()).count(text) == 1
+
+
 def test_results_are_those_of_the_functions(scene, tmp_path):
     path = scene()
     names = [stage.name for stage in fc.scenes.plan(fc.scenes.load(path))]
