@@ -98,14 +98,20 @@ def generator_options(table: SurfaceTable) -> dict[str, Any]:
     return options
 
 
-def surface_grid(scene: Scene) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Return shape and spacing (y, x; m) of the surface; a generated one is not made for that."""
+def surface_grid(
+    scene: Scene, face: xr.DataArray | None = None
+) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Return shape and spacing (y, x; m) of the surface; a generated one is not made for that.
+
+    A surface that has been read is the `face`.
+    """
     options = scene.surface.options
     if scene.surface.generate is not None:
         shape, spacing = np.broadcast_to(options["shape"], 2), np.broadcast_to(options["spacing"], 2)
         return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
     # its heights do not matter: what is removed from them, or filled, leaves the grid as it is
-    surface = read_surface(replace(scene.surface, despike=False, fill=False, level=None), scene.folder)
+    as_read = replace(scene.surface, despike=False, fill=False, level=None)
+    surface = read_surface(as_read, scene.folder) if face is None else face
     return (surface.sizes["y"], surface.sizes["x"]), spacing_of(surface)
 
 

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import parameters_of, public_function
 from fractalcontact.scenes._inputs import read_surface
 from fractalcontact.scenes._options import call_options, crack_options, stage_options
-from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
+from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
     STAGES,
@@ -162,17 +161,23 @@ def concatenate(results: list[xr.Dataset], dim: str) -> xr.Dataset:
     return joined
 
 
-def stage_work(stage: Stage, scene: Scene, results: Results, works: Mapping[str, StageWork]) -> StageWork:
-    """Return the parts of a stage, from the results and the parts of the stages it needs."""
+def stage_work(
+    stage: Stage,
+    scene: Scene,
+    results: Results,
+    works: Mapping[str, StageWork],
+    faces: Mapping[str, xr.DataArray],
+) -> StageWork:
+    """Return the parts of a stage, from the results and parts of the stages it needs, and the faces read."""
     if stage.reads_part:
         return works[stage.needs[0]]
     if stage.reads_map:
         return StageWork((partial(map_reader(stage, scene), results[stage.needs[0]]),))
     row, options = stage.row, call_options(scene, stage.row, stage.keep)
     if stage.name == "surfaces":
-        return StageWork((partial(_read_height, scene.surface, scene.folder),))
+        return StageWork((partial(_lower_face, scene, faces.get("surface")),))
     if row.takes == "file":
-        return StageWork((partial(_upper_face, scene, _heights(results, "surfaces")),))
+        return StageWork((partial(_upper_face, scene, _heights(results, "surfaces"), faces.get("upper")),))
     if row.takes == "result":
         return StageWork((partial(call, row.function, results[stage.needs[0]], **options),))
     if row.takes == "surface":
@@ -192,8 +197,9 @@ def map_reader(stage: Stage, scene: Scene) -> MapReader:
     return MapReader(stage.row.function, stage.row.reads, call_options(scene, stage.row, stage.keep))
 
 
-def _read_height(table: SurfaceTable, folder: Path) -> xr.Dataset:
-    return as_dataset(read_surface(table, folder).rename("height"))
+def _lower_face(scene: Scene, face: xr.DataArray | None) -> xr.Dataset:
+    face = read_surface(scene.surface, scene.folder) if face is None else face
+    return as_dataset(face.rename("height"))
 
 
 def _prepared(subpackage: str, scene: Scene, results: Results) -> xr.DataArray:
@@ -246,8 +252,8 @@ def _heights(results: Results, stage: str) -> xr.DataArray:
     return with_provenance(results[stage], "height")
 
 
-def _upper_face(scene: Scene, lower: xr.DataArray) -> xr.Dataset:
-    upper = read_surface(scene.upper or scene.surface, scene.folder, lower)
+def _upper_face(scene: Scene, lower: xr.DataArray, upper: xr.DataArray | None) -> xr.Dataset:
+    upper = read_surface(scene.upper or scene.surface, scene.folder, lower) if upper is None else upper
     if scene.joint.register:
         faces = call("joints.register", lower, upper, turn_upper=scene.joint.turn_upper)
         validate_placed(scene, lower, faces["height"])

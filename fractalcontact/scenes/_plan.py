@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,6 +29,9 @@ from fractalcontact.scenes._stages import (
     StageType,
     section_length,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 WITH_MEMORY = 80  # characters of a screen that holds the table with its column of memory
 
@@ -210,13 +213,13 @@ READ = 24.0  # bytes for each point of a file while it is read
 PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
 
 
-def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
+def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None = None) -> dict[str, float]:
     """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read."""
     generator = scene.surface.generate
     if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
         return {}
     try:
-        shape, spacing = surface_grid(scene)
+        shape, spacing = surface_grid(scene, face)
     except InvalidInput:
         return {}
     surface, block = Plane(shape, generator in PERIODIC), Plane(block_shape(scene, shape, spacing))
@@ -247,9 +250,11 @@ def stage_memory(scene: Scene, stages: Sequence[Stage]) -> dict[str, float]:
     return peaks
 
 
-def check_memory(scene: Scene, stages: Sequence[Stage], workers: int = 0) -> None:
+def check_memory(
+    scene: Scene, stages: Sequence[Stage], workers: int = 0, face: xr.DataArray | None = None
+) -> None:
     """Raise `TooLittleMemory` unless the stage that needs most fits, in each of several processes."""
-    peaks = stage_memory(scene, stages)
+    peaks = stage_memory(scene, stages, face)
     if not peaks:
         return
     name = max(peaks, key=lambda stage: peaks[stage])

@@ -35,10 +35,10 @@ from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import PARTIAL, ScanStudies
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES
-from fractalcontact.scenes._study import Ensemble, Study
+from fractalcontact.scenes._study import Study, study_ensemble
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._tables import tables
-from fractalcontact.scenes._validation import validate
+from fractalcontact.scenes._validation import validated
 
 OWN_REFERENCES = "see the references of each group"
 # what the root of a result states of its groups, for a reader that opens no group
@@ -128,18 +128,18 @@ def run(
     start = time.perf_counter()
     _check(summary, verbose, force, workers, client)
     with worker_processes(workers) as processes:
-        scene = validate(scene)
+        scene, faces = validated(scene)
         scans = scans_of(scene)
         whole: Summary | None
         if not scans:
-            check_memory(scene, stages_of(scene), workers)
+            check_memory(scene, stages_of(scene), workers, faces.get("surface"))
         among = workers_of(processes if client is None else client)
         with _results_folder.results_folder(out, scene, force=force) as folder:
             if scans:
                 tree, whole = _run_scans(scene, scans, folder, progress, among, start)
             else:
                 with locked(folder), signals.noted(folder is not None) as stop:
-                    tree, whole = _run(scene, folder, progress, among, start, stop)
+                    tree, whole = _run(scene, folder, progress, among, start, stop, faces=faces)
     if summary:
         print(_text(tree, whole, verbose=verbose))  # noqa: T201
     return tree
@@ -211,26 +211,25 @@ def _run(
     start: float,
     stop: signals.Stop,
     facts: Mapping[str, str] = MappingProxyType({}),
+    faces: Mapping[str, xr.DataArray] = MappingProxyType({}),
 ) -> tuple[xr.DataTree, Summary | None]:
-    """Return the results, and the summary where the report computed it.
+    """Return the results, and the summary where the report computed it; `faces` have been read.
 
     One of many scans, whose `facts` mark it as finished, goes on without stages that fail.
     """
     store = PartStore(folder)
     scene = with_seeds(scene, store)
-    study: Study | Ensemble
     if scene.surface.members is None:
-        study = Study(scene, store, progress, workers, goes_on=bool(facts))
+        study = Study(scene, store, progress, workers, goes_on=bool(facts), faces=faces).run(stop)
     else:
-        study = Ensemble(scene, store, progress, workers)
-    missing = study.run(stop)
-    missing += [FIGURES] if stop and scene.want.figures else []
-    groups = study.groups()
+        study = study_ensemble(scene, store, progress, workers, stop)
+    missing = study.missing + ([FIGURES] if stop and scene.want.figures else [])
+    groups = study.groups
     for name in ("contact", "joints/closure"):
         if name in groups:
             warn(implausible_result(name, groups[name]))
     tree = _assemble(scene, groups, study.seconds, missing)
-    tree.attrs |= study.preparation()
+    tree.attrs |= study.preparation
     reasons = list(dict.fromkeys(study.failures.values()))
     failed = [", ".join(stage for stage in study.failures if study.failures[stage] == why) for why in reasons]
     lines = [f"{stages}: {why}" for stages, why in zip(failed, reasons, strict=True)]

@@ -7,7 +7,9 @@ its own random stream, so that it can be generated wherever its study runs.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import xarray as xr
 
@@ -47,6 +49,31 @@ class _PartTask:
         return results, seconds
 
 
+@dataclass(frozen=True, repr=False)
+class StudyResults:
+    """What a run came to.
+
+    Attributes
+    ----------
+    groups : dict
+        The wanted results of the finished stages, by group.
+    seconds : dict
+        Seconds that each stage took in this run, all members together.
+    missing : list of str
+        What a stop has left out.
+    failures : dict of str to str
+        Stages that failed, or need one that did, and why.
+    preparation : dict
+        What was done to the faces, in words, and how much of the heights is a tilt.
+    """
+
+    groups: dict[str, xr.Dataset]
+    seconds: dict[str, float]
+    missing: list[str] = field(default_factory=list)
+    failures: dict[str, str] = field(default_factory=dict)
+    preparation: dict[str, str | float] = field(default_factory=dict)
+
+
 class Study:
     """One run of a scene with one surface: the results so far and the time they took.
 
@@ -60,6 +87,8 @@ class Study:
         Seconds that each stage took in this run.
     failures : dict of str to str
         Stages that failed, or need one that did, and why; empty unless the study `goes_on` without them.
+    faces : mapping
+        The faces of `[surface]` and `[upper]` that were read to validate the scene; others are read here.
     """
 
     def __init__(
@@ -70,9 +99,10 @@ class Study:
         workers: Workers | None,
         *,
         goes_on: bool = False,
+        faces: Mapping[str, xr.DataArray] = MappingProxyType({}),
     ) -> None:
         self.scene, self.store, self.progress, self.workers = scene, store, progress, workers
-        self.goes_on, self.failures = goes_on, dict[str, str]()
+        self.goes_on, self.failures, self.faces = goes_on, dict[str, str](), faces
         self.plan = stages_of(scene)
         self.parts: dict[str, dict[int, xr.Dataset]] = {}
         self.results: dict[str, xr.Dataset] = {}
@@ -82,8 +112,8 @@ class Study:
         for stage in self.plan:
             self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped_maps(stage))
 
-    def run(self, stop: signals.Stop) -> list[str]:
-        """Run all stages; return what is missing if a stop was requested.
+    def run(self, stop: signals.Stop) -> StudyResults:
+        """Run all stages, or those before a stop was requested.
 
         The surfaces come first, so that faces which do not fit are refused before a part is kept. The parts
         of all stages whose needs are met then run side by side, where there are workers or a copy of this
@@ -99,7 +129,9 @@ class Study:
                 left = [stage for stage in left if stage not in ready]
         names = [stage.name for stage in stages if stage.name in self.results]
         self.results = {name: self.results[name] for name in names}
-        return [line for stage in stages for line in self._missing(stage)] if stop else []
+        missing = [line for stage in stages for line in self._missing(stage)] if stop else []
+        seconds = {name: self.spent[name] for name in self.results}
+        return StudyResults(self._groups(), seconds, missing, self.failures, self._preparation())
 
     def _missing(self, stage: Stage) -> list[str]:
         """Return the name of a stage with missing parts, and how many are there; nothing if it failed."""
@@ -116,7 +148,9 @@ class Study:
         tasks: dict[tuple[str, int], _PartTask] = {}
         for stage in (stage for stage in stages if not self._lacks(stage)):
             try:
-                self.works[stage.name] = _parts.stage_work(stage, self.scene, self.results, self.works)
+                self.works[stage.name] = _parts.stage_work(
+                    stage, self.scene, self.results, self.works, self.faces
+                )
                 tasks |= self._tasks(stage)
             except Exception as error:
                 self._fail(stage.name, error)
@@ -204,7 +238,7 @@ class Study:
     def _key(self, name: str, number: int) -> str:
         return f"{name.replace('/', '.')}.{self.digests[name]}.{number:03d}"
 
-    def groups(self) -> dict[str, xr.Dataset]:
+    def _groups(self) -> dict[str, xr.Dataset]:
         """Return the wanted results of the finished stages, without the maps that only other stages read."""
         return {
             stage.name: _parts.without(self.results[stage.name], self._internal_maps(stage))
@@ -212,7 +246,7 @@ class Study:
             if stage.stored and stage.name in self.results
         }
 
-    def preparation(self) -> dict[str, str | float]:
+    def _preparation(self) -> dict[str, str | float]:
         """Return what was done to the faces, in words, and how much of the heights is a tilt."""
         if "surfaces" not in self.results:
             return {}
@@ -228,11 +262,6 @@ class Study:
             facts["plane_share"] = plane_share(height)
         return facts
 
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds that the finished stages took in this run."""
-        return {name: self.spent[name] for name in self.results}
-
 
 def reason_of(error: Exception) -> str:
     """Return why something failed, in one line."""
@@ -244,14 +273,6 @@ def reason_of(error: Exception) -> str:
 def _is_fast_to_repeat(stage: Stage, scene: Scene) -> bool:
     """Whether a surface is made again as fast as read from a kept part; validation makes it anyway."""
     return stage.name == "surfaces" or (stage.name == "joints/faces" and not scene.joint.register)
-
-
-@dataclass(frozen=True, repr=False)
-class MemberResults:
-    """Results of one member by stage, and the seconds of each stage."""
-
-    results: dict[str, xr.Dataset]
-    seconds: dict[str, float]
 
 
 @dataclass(frozen=True, repr=False)
@@ -267,12 +288,10 @@ class _MemberTask:
         """The digests of all stages of this member."""
         return list(self._study(PartStore(None)).digests.values())
 
-    def __call__(self, store: PartStore, stop: signals.Stop) -> MemberResults | None:
+    def __call__(self, store: PartStore, stop: signals.Stop) -> StudyResults | None:
         """Return the results of the member; None if a stop cut it short."""
-        study = self._study(store)
-        if stop or study.run(stop):
-            return None
-        return MemberResults(study.groups(), study.seconds)
+        done = None if stop else self._study(store).run(stop)
+        return None if done is None or done.missing else done
 
     def _study(self, store: PartStore) -> Study:
         table = {key: value for key, value in self.scene.table("surface").items() if key != "members"}
@@ -280,49 +299,26 @@ class _MemberTask:
         return Study(replace(self.scene, tables=tables), store, progress=False, workers=self.workers)
 
 
-class Ensemble:
-    """One run of a scene with an ensemble: the results so far and the time they took."""
-
-    def __init__(self, scene: Scene, store: PartStore, progress: bool, workers: Workers | None) -> None:
-        self.scene, self.store, self.progress, self.workers = scene, store, progress, workers
-        self.finished: dict[int, MemberResults] = {}
-
-    def run(self, stop: signals.Stop) -> list[str]:
-        """Study all members; return what is missing if a stop was requested."""
-        count = int(self.scene.surface.members or 0)
-        # with more workers than members, the parts of one member after the other are shared
-        share_parts = self.workers is not None and self.workers.count > count
-        of_parts, of_members = (self.workers, None) if share_parts else (None, self.workers)
-        tasks = {member: _MemberTask(self.scene, member, of_parts) for member in range(count)}
-        points = math.prod(surface_grid(self.scene)[0])
-        finished = run_tasks(tasks, self.store, stop, of_members, points=points)
-        bar = track(finished, self.progress, self.scene.name, unit="member", total=count)
-        self.finished = dict(sorted(bar, key=lambda entry: entry[0]))
-        done = len(self.finished)
-        return [] if done == count else [f"{count - done} of {count} members"]
-
-    def groups(self) -> dict[str, xr.Dataset]:
-        """Return the wanted results of the finished members."""
-        members = {member: each.results for member, each in self.finished.items()}
-        names = next(iter(members.values()), {})
-        return {
-            name: stacked({member: results[name] for member, results in members.items()}, MEMBER)
-            for name in names
-        }
-
-    @property
-    def failures(self) -> dict[str, str]:
-        """Return nothing: a stage that fails ends the study."""
-        return {}
-
-    def preparation(self) -> dict[str, str | float]:
-        """Return nothing: the surfaces of an ensemble are generated."""
-        return {}
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds that each stage took in this run, all members together."""
-        spent: dict[str, float] = {}
-        for each in self.finished.values():
-            spent |= {name: spent.get(name, 0.0) + seconds for name, seconds in each.seconds.items()}
-        return spent
+def study_ensemble(
+    scene: Scene, store: PartStore, progress: bool, workers: Workers | None, stop: signals.Stop
+) -> StudyResults:
+    """Study all members, or those before a stop was requested; a stage that fails ends the study."""
+    count = int(scene.surface.members or 0)
+    # with more workers than members, the parts of one member after the other are shared
+    share_parts = workers is not None and workers.count > count
+    of_parts, of_members = (workers, None) if share_parts else (None, workers)
+    tasks = {member: _MemberTask(scene, member, of_parts) for member in range(count)}
+    points = math.prod(surface_grid(scene)[0])
+    finished = run_tasks(tasks, store, stop, of_members, points=points)
+    bar = track(finished, progress, scene.name, unit="member", total=count)
+    members = dict(sorted(bar, key=lambda entry: entry[0]))
+    names = next(iter(members.values())).groups if members else {}
+    groups = {
+        name: stacked({member: done.groups[name] for member, done in members.items()}, MEMBER)
+        for name in names
+    }
+    seconds: dict[str, float] = {}
+    for done in members.values():
+        seconds |= {name: seconds.get(name, 0.0) + spent for name, spent in done.seconds.items()}
+    missing = [f"{count - len(members)} of {count} members"] if len(members) < count else []
+    return StudyResults(groups, seconds, missing)

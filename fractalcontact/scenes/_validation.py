@@ -72,13 +72,18 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
     >>> fc.scenes.validate("rigid_sliding").name
     'rigid_sliding'
     """
+    return validated(scene)[0]
+
+
+def validated(scene: Scene | str | os.PathLike[str]) -> tuple[Scene, dict[str, xr.DataArray]]:
+    """Return a valid scene, and its faces that were read from files."""
     with Problems("fractalcontact.scenes.validate") as problems:
         expected = "a Scene or the path of a TOML file"
         problems.require(isinstance(scene, (Scene, str, os.PathLike)), "scene", expected, scene)
     scene, problems = check_tables(scene) if isinstance(scene, Scene) else parse(scene)
     if not problems.messages and (scans := scans_of(scene)):
         _require_valid_scan(scans)
-        return scene
+        return scene, {}
     with problems:
         if not _is_valid(problems, "material"):
             known = {key: table for key, table in scene.tables.items() if key != "material"}
@@ -88,7 +93,7 @@ def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
         surfaces = _validate_surfaces(scene, problems)
         _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
     warn(implausible_input(scene, surfaces["surface"]))
-    return scene
+    return scene, {name: face for name, face in surfaces.items() if "generate" not in scene.table(name)}
 
 
 def validate_placed(scene: Scene, lower: xr.DataArray, upper: xr.DataArray) -> None:
