@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.random_effects import random_effects
 from fractalcontact.base.robust import is_far
-from fractalcontact.base.study import group_of
-from fractalcontact.base.units import jrc_text
+from fractalcontact.base.study import MEMBER, group_of
+from fractalcontact.scenes import _rows
 from fractalcontact.scenes._result_tables import (
     SCAN,
     Column,
@@ -29,32 +28,60 @@ SCANS = "scans"  # folder and group of the single scans
 OVERVIEW = "overview"  # group: a row for every scan
 ERROR = "standard_error"  # of the fractal dimension
 WORDS = 3  # names of scans in a sentence
-# head, variable and decimals of what stands for a study
-MAIN_COLUMNS = (
-    ("dimension D", "fractal_dimension", 3),
-    ("JRC", "roughness_coefficient", 1),
-    ("Sq", "rms_height", None),
-    ("largest contact area", "contact_fraction", None),
-    ("largest closure", "interface_closure", None),
-    ("largest dilatancy", "rigid_dilatancy", None),
-    ("largest strength", "peak_shear_strength", None),
+JRC, DIMENSION = "roughness_coefficient", "fractal_dimension"
+
+
+@dataclass(frozen=True)
+class Main:
+    """A number that stands for a study: the column of a table of scans, and the groups that have it.
+
+    The last of the groups counts. `beside` are further variables of the group that go with it.
+    """
+
+    column: Column
+    name: str
+    groups: tuple[str, ...]
+    beside: tuple[str, ...] = ()
+
+
+def _main(head: str, name: str, decimals: int | None, *groups: str, beside: tuple[str, ...] = ()) -> Main:
+    return Main(Column(head, name, decimals), name, groups, beside)
+
+
+ENDS = (f"{DIMENSION}_low", f"{DIMENSION}_high")
+MAIN = (
+    _main("dimension D", DIMENSION, 3, "dimensions", beside=(*ENDS, ERROR)),
+    Main(_rows.roughness_coefficient.columns[0], JRC, ("joints/roughness_coefficient",)),
+    _main("Sq", "rms_height", None, "surfaces/description"),
+    _main("largest contact area", "contact_fraction", None, "contact", "joints/closure"),
+    _main("largest closure", "interface_closure", None, "joints/closure"),
+    _main("largest dilatancy", "rigid_dilatancy", None, "joints/rigid_dilatancy"),
+    _main("largest strength", "peak_shear_strength", None, "joints/friction", "joints/direct_shear"),
 )
-JRC = "roughness_coefficient"
-ENDS = ("fractal_dimension_low", "fractal_dimension_high")
-
-
-def _jrc(scan: xr.Dataset) -> Any:
-    """Return the roughness coefficient; words for one below its scale."""
-    if JRC not in scan:
-        return None
-    return jrc_text(float(scan[JRC])) if scan[JRC] < 0 else scan[JRC]
-
-
-_COLUMNS = [Column(head, _jrc if name == JRC else name, decimals) for head, name, decimals in MAIN_COLUMNS]
+_COLUMNS = [entry.column for entry in MAIN]
 _ROWS = Rows(
     "scans", (SCAN,),
     (_COLUMNS[0], Column("95 % interval", ENDS, 3), *_COLUMNS[1:], Column("why it failed", "reason")),
 )  # fmt: skip
+
+
+def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return the numbers that stand for a study: dimensions of the first method, else the largest values.
+
+    Of an ensemble they are means over the members.
+    """
+    main: dict[str, xr.DataArray] = {}
+    for entry in MAIN:
+        for group in (group for group in entry.groups if group in results):
+            result = results[group]
+            for name in (name for name in (entry.name, *entry.beside) if name in result):
+                values = result[name].isel(method=0, drop=True) if "method" in result.dims else result[name]
+                others = [dim for dim in values.dims if dim != MEMBER]
+                number = values.max(others).mean() if others else values.mean()
+                over = f": the largest over {', '.join(map(str, others))}" if others else ""
+                label = f"{values.attrs.get('long_name', name)}{over}, of the group {group}"
+                main[name] = number.drop_vars(number.coords).assign_attrs(values.attrs, long_name=label)
+    return xr.Dataset(main)
 
 
 def pictured(tree: xr.DataTree) -> xr.DataTree:
@@ -75,11 +102,11 @@ def pooled(overview: xr.Dataset) -> xr.Dataset:
             continue
         if key == JRC:
             values = values.where(values >= 0)
-        has_errors = key == "fractal_dimension" and ERROR in overview and overview[ERROR].notnull().any()
+        has_errors = key == DIMENSION and ERROR in overview and overview[ERROR].notnull().any()
         errors = overview[ERROR].values if has_errors else 0.0
         found = random_effects(values.values, errors)
         # D lies between two whole numbers; what is negative in no scan is so in no mean
-        is_dimension, smallest = key == "fractal_dimension", float(values.min())
+        is_dimension, smallest = key == DIMENSION, float(values.min())
         least = float(np.floor(smallest)) if is_dimension else 0.0 if smallest >= 0.0 else -np.inf
         low, high = np.clip((found.low, found.high), least, least + 1.0 if is_dimension else np.inf)
         text = f"{values.attrs['long_name'].partition(':')[0]}: "
@@ -112,7 +139,8 @@ def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
     if overview is None:
         return
     keys, cells = [], []
-    for head, name, decimals in MAIN_COLUMNS:
+    for entry in MAIN:
+        head, decimals, name = entry.column.head, entry.column.decimals, entry.name
         if name not in root:
             continue
         scale = column_scale(root[name])
@@ -146,8 +174,8 @@ def scan_facts(tree: xr.DataTree) -> Iterator[str]:
     if JRC in overview and (overview[JRC] < 0).any():
         chosen = names[overview[JRC].values < 0]
         yield f"JRC is below 0, beyond its scale, and left out of the mean: {_few(chosen)}"
-    found = {head: names[is_far(overview[name].values)] for head, name, _ in MAIN_COLUMNS if name in overview}
-    texts = [f"{head} of {_few(far)}" for head, far in found.items() if far.size]
+    found = {each.column.head: is_far(overview[each.name].values) for each in MAIN if each.name in overview}
+    texts = [f"{head} of {_few(names[is_one])}" for head, is_one in found.items() if is_one.any()]
     if texts:
         yield f"outliers: {'; '.join(texts)}"
     caveats = [name for name, text in zip(names, overview["caveats"].values, strict=True) if text]

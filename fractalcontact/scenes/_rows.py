@@ -132,8 +132,8 @@ def _outside_scale(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
 
 def _jrc(state: xr.Dataset) -> Any:
     """Return the roughness coefficient; words for one below the scale."""
-    value = state["roughness_coefficient"]
-    return value if value.ndim else jrc_text(float(value))
+    value = state.get("roughness_coefficient")
+    return jrc_text(float(value)) if value is not None and value.ndim == 0 and value < 0 else value
 
 
 def _jrc_scatter(state: xr.Dataset) -> str | None:

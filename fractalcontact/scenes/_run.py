@@ -20,7 +20,7 @@ from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
 from fractalcontact.base.references import joined_references, provenance_of
-from fractalcontact.base.study import MEMBER, of_member
+from fractalcontact.base.study import of_member
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
@@ -28,7 +28,7 @@ from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import write_report
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, pictured, pooled
+from fractalcontact.scenes._overview import OVERVIEW, SCANS, main_results, pictured, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._scan_files import scans_of
@@ -41,17 +41,6 @@ from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validated
 
 OWN_REFERENCES = "see the references of each group"
-# what the root of a result states of its groups, for a reader that opens no group
-MAIN = {
-    "surfaces/description": ("rms_height",),
-    "dimensions": ("fractal_dimension", "fractal_dimension_low", "fractal_dimension_high", "standard_error"),
-    "joints/roughness_coefficient": ("roughness_coefficient",),
-    "contact": ("contact_fraction",),
-    "joints/closure": ("contact_fraction", "interface_closure"),
-    "joints/rigid_dilatancy": ("rigid_dilatancy",),
-    "joints/friction": ("peak_shear_strength",),
-    "joints/direct_shear": ("peak_shear_strength",),
-}
 
 
 def run(
@@ -294,7 +283,7 @@ def _assemble(
     main: xr.Dataset | None = None,
 ) -> xr.DataTree:
     """Return the finished results as a tree that states what is missing; in its root the `main` ones."""
-    groups = {"/": _main_results(results) if main is None else main} | {
+    groups = {"/": main_results(results) if main is None else main} | {
         f"/{name}": result for name, result in results.items()
     }
     description = groups.pop("/surfaces/description", None)
@@ -325,24 +314,6 @@ def _assemble(
     if missing:
         tree.attrs["completeness"] = f"{PARTIAL}the run was stopped; missing: {', '.join(missing)}"
     return tree
-
-
-def _main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """Return numbers that stand for a study: dimensions of the first method, else the largest values.
-
-    Of an ensemble they are means over the members.
-    """
-    main: dict[str, xr.DataArray] = {}
-    for group, names in MAIN.items():
-        result = results.get(group, xr.Dataset())
-        for name in (name for name in names if name in result):
-            values = result[name].isel(method=0, drop=True) if "method" in result.dims else result[name]
-            others = [dim for dim in values.dims if dim != MEMBER]
-            number = values.max(others).mean() if others else values.mean()
-            over = f": the largest over {', '.join(map(str, others))}" if others else ""
-            label = f"{values.attrs.get('long_name', name)}{over}, of the group {group}"
-            main[name] = number.drop_vars(number.coords).assign_attrs(values.attrs, long_name=label)
-    return xr.Dataset(main)
 
 
 def _without_folders(tables: Mapping[str, Any]) -> dict[str, Any]:
