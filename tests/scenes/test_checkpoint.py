@@ -2,14 +2,13 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 import zipfile
 
 import netCDF4
 import numpy as np
 import pytest
+from copies import Copy, copied_command
 from study import SOUND, watch_calls
 
 import fractalcontact as fc
@@ -17,7 +16,7 @@ from fractalcontact.base.errors import FractalContactWarning, InvalidInput, Unre
 from fractalcontact.base.file_contents import file_contents
 from fractalcontact.base.signals import Stopped
 
-resource = pytest.importorskip("resource")  # signals and limits as Unix has them
+pytest.importorskip("resource")  # signals and limits as Unix has them
 
 STUDY = SOUND.replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -123,13 +122,12 @@ def test_repeated_signal_within_half_a_second_counts_once(tmp_path):
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 def test_killed_study_leaves_no_incomplete_file(uninterrupted, tmp_path, number):
-    words = [sys.executable, "-m", "fractalcontact", "run", uninterrupted[0], "-o", tmp_path, "--quiet"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    process = Copy("run", uninterrupted[0], "-o", tmp_path, "--quiet")
     deadline = time.monotonic() + 60
     while not list(tmp_path.glob(".stages/*.npz")) and time.monotonic() < deadline:
-        time.sleep(0.01)
+        time.sleep(0.001)
     os.kill(process.pid, number)
-    _, text = process.communicate(timeout=60)
+    _, text = process.communicate()
     if number != signal.SIGKILL:
         assert process.returncode == 128 + number
         assert "resumes" in text
@@ -221,17 +219,8 @@ def test_contents_of_a_file_with_foreign_provenance(tmp_path, text):
     assert list(fc.open(tmp_path / "other.nc")["word"].values) == ["a", "b"]
 
 
-def limited(size):
-    def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-
-    return limit
-
-
 def test_full_disk_is_a_clear_error_and_the_study_resumes(uninterrupted, tmp_path):
-    words = [sys.executable, "-m", "fractalcontact", "run", uninterrupted[0], "-o", tmp_path, "--quiet"]
-    done = subprocess.run(words, preexec_fn=limited(40_000), capture_output=True, text=True, check=False)
+    done = copied_command("run", uninterrupted[0], "-o", tmp_path, "--quiet", largest_file=40_000)
     assert done.returncode == 2, done.stderr
     assert "cannot be written here" in done.stderr
     assert "Traceback" not in done.stderr

@@ -16,7 +16,8 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from study import SOUND, command, watch_calls
+from copies import Copy, copied_command
+from study import SOUND, watch_calls
 
 import fractalcontact as fc
 from fractalcontact import cli
@@ -134,7 +135,7 @@ def test_invalid_number_of_workers_is_refused(uninterrupted, tmp_path, capsys):
 
 
 def test_command_with_worker_processes_writes_the_same_bytes(uninterrupted, tmp_path):
-    done = command("run", uninterrupted[0], "-o", tmp_path, "--workers", 2, "--quiet")
+    done = copied_command("run", uninterrupted[0], "-o", tmp_path, "--workers", 2, "--quiet")
     assert (done.returncode, done.stderr) == (0, "")
     assert contents(tmp_path / "result.nc") == uninterrupted[1]
 
@@ -147,6 +148,7 @@ class Watch:
     def find_spec(self, name, path, target=None):
         if name == "numpy":
             print(os.environ.get("OPENBLAS_NUM_THREADS"), os.environ.get("MKL_NUM_THREADS"))
+            raise SystemExit
 sys.meta_path.insert(0, Watch())
 import fractalcontact.scenes._worker
 """
@@ -158,22 +160,11 @@ import fractalcontact.scenes._worker
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
 def test_stopped_worker_processes_end_and_the_study_resumes(uninterrupted, tmp_path, number):
-    words = [
-        sys.executable,
-        "-m",
-        "fractalcontact",
-        "run",
-        uninterrupted[0],
-        "-o",
-        tmp_path,
-        "--workers",
-        "2",
-    ]
-    process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    process = Copy("run", uninterrupted[0], "-o", tmp_path, "--workers", 2)
     while not list(tmp_path.glob(".stages/*.npz")) and process.poll() is None:
         time.sleep(0.005)
     os.kill(process.pid, number)
-    _, message = process.communicate(timeout=60)  # the pipe closes when the last worker has ended
+    _, message = process.communicate()  # the pipe closes when the last worker has ended
     assert process.returncode == (-number if number == signal.SIGKILL else 128 + number), message
     fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
     assert contents(tmp_path / "result.nc") == uninterrupted[1]

@@ -3,8 +3,6 @@
 import functools
 import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from urllib.parse import quote
@@ -12,7 +10,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 import xarray as xr
-from study import command
+from copies import Copy, copied_command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
@@ -46,6 +44,14 @@ def study(tmp_path_factory):
     with pytest.warns(FractalContactWarning, match="1 of 6 scans failed or are incomplete"):
         result = fc.scenes.run(scene, out=folder / "out", progress=False)
     return scene, folder / "out", result
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory):
+    """Five sound scans, studied in this process: their scene, folder and result."""
+    folder = tmp_path_factory.mktemp("serial")
+    scene = write_scans(folder)
+    return scene, folder / "out", fc.scenes.run(scene, out=folder / "out", progress=False)
 
 
 def same(one, other, leave_out=("run_time",)):
@@ -198,14 +204,11 @@ def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
     )
 
 
-def test_workers_change_no_bit(tmp_path):
-    scene = write_scans(tmp_path)
-    results = [fc.scenes.run(scene, out=tmp_path / f"{n}", progress=False, workers=n) for n in (0, 2)]
-    same(*results)
-    same(*(fc.open(tmp_path / f"{n}" / "result.nc") for n in (0, 2)))
-    assert {path.name for path in (tmp_path / "2").iterdir()} == {
-        path.name for path in (tmp_path / "0").iterdir()
-    }
+def test_workers_change_no_bit(serial, tmp_path):
+    scene, out, result = serial
+    same(fc.scenes.run(scene, out=tmp_path, progress=False, workers=2), result)
+    same(*(fc.open(folder / "result.nc") for folder in (tmp_path, out)))
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in out.iterdir()}
 
 
 def test_without_a_folder_the_result_has_maps_and_curves_have_their_own_scales(tmp_path):
@@ -277,13 +280,13 @@ def test_command_prints_a_row_for_each_scan_and_tells_failures_by_its_exit(tmp_p
     write_scans(tmp_path)
     files = [*(tmp_path / "scans" / name for name in GRIDS), tmp_path / "scans" / "bad.nc"]
     files[-1].write_bytes(b"")
-    done = command("roughness", *files, "-o", tmp_path / "out", "--workers", 2)
+    done = copied_command("roughness", *files, "-o", tmp_path / "out", "--workers", 2)
     assert done.returncode == 1, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) <= 40
     assert sum(line.startswith(tuple(GRIDS)) for line in lines) == len(GRIDS)
     assert any(line.startswith("dimension D") for line in lines)
-    refused = command("joint", *files[:4], "--young", "30GPa", "-o", tmp_path / "joint")
+    refused = copied_command("joint", *files[:4], "--young", "30GPa", "-o", tmp_path / "joint")
     assert refused.returncode == 2
     assert "differ by the face alone" in refused.stderr
 
@@ -317,29 +320,25 @@ def test_many_rows_are_cut_with_a_word(study):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_stopped_study_resumes_from_its_finished_scans(tmp_path, number):
-    scene = write_scans(tmp_path)
-    whole = fc.scenes.run(scene, out=tmp_path / "whole", progress=False)
-    out = tmp_path / "out"
-    words = [sys.executable, "-m", "fractalcontact", "run", scene, "-o", out, "--workers", "2", "--quiet"]
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+def test_stopped_study_resumes_from_its_finished_scans(serial, tmp_path, number):
+    scene, out = serial[0], tmp_path / "out"
+    process = Copy("run", scene, "-o", out, "--workers", 2, "--quiet")
     while not list(out.glob("scans/*/report.html")) and process.poll() is None:
         time.sleep(0.005)
-    process.send_signal(number)
-    _, message = process.communicate(timeout=120)
+    os.kill(process.pid, number)
+    _, message = process.communicate()
     assert process.returncode == (-number if number == signal.SIGKILL else 128 + number), message
     finished = {path: path.stat().st_mtime_ns for path in out.glob("scans/*/report.html")}
     assert finished
-    same(fc.scenes.run(scene, out=out, progress=False), whole)
+    same(fc.scenes.run(scene, out=out, progress=False), serial[2])
     assert {path: path.stat().st_mtime_ns for path in finished} == finished
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", ["worker", "scheduler"])
-def test_lost_process_of_dask_loses_no_finished_scan(tmp_path, lost):
+def test_lost_process_of_dask_loses_no_finished_scan(serial, tmp_path, lost):
     distributed = pytest.importorskip("distributed")
-    scene, out = write_scans(tmp_path), tmp_path / "out"
-    whole = fc.scenes.run(scene, out=tmp_path / "whole", progress=False)
+    scene, out = serial[0], tmp_path / "out"
     cluster = distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None)
 
     def end_one():
@@ -364,4 +363,4 @@ def test_lost_process_of_dask_loses_no_finished_scan(tmp_path, lost):
         result = fc.scenes.run(scene, out=out, progress=False)
         assert finished
         assert {path: path.stat().st_mtime_ns for path in finished} == finished
-    same(result, whole)
+    same(result, serial[2])
