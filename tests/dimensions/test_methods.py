@@ -1,8 +1,5 @@
 """Names and descriptions of the methods."""
 
-import subprocess
-import sys
-
 import fractalcontact as fc
 
 VALIDATED = ["likelihood", "increments"]
@@ -13,15 +10,6 @@ def test_descriptions():
     assert next(iter(table)) == "likelihood"
     assert all(isinstance(line, str) and line.count("\n") == 0 for line in table.values())
     assert [name for name, line in table.items() if "95 % interval" in line] == VALIDATED
-
-
-def test_import_loads_no_heavy_library():
-    code = (
-        "import sys, fractalcontact.dimensions as d; d.methods();"
-        "print(sorted(set(sys.modules) & {'numba', 'xarray', 'matplotlib', 'skimage', 'dask', 'netCDF4'}))"
-    )
-    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert process.stdout.strip() == "[]"
 
 
 def test_psd_is_the_spectrum():

@@ -1,11 +1,6 @@
-"""Masks as input of all functions: accepted types, refused values, labels of the results.
-
-The import of the subpackage loads no heavy library.
-"""
+"""Masks as input of all functions: accepted types, refused values, labels of the results."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -175,18 +170,6 @@ def test_leading_dims_with_names_of_results_are_refused():
     mask = xr.DataArray(np.ones((2, 4, 4), bool), dims=("box_size", "y", "x"))
     with pytest.raises(ValueError, match="mask.dims"):
         fc.domains.box_dimension(mask)
-
-
-def test_import_loads_no_heavy_library():
-    code = (
-        "import sys, fractalcontact.domains;"
-        "heavy = {'numba', 'xarray', 'scipy', 'matplotlib', 'skimage', 'dask', 'netCDF4'};"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules);"
-        "fractalcontact.domains.box_dimension;"
-        "heavy = {'matplotlib', 'skimage', 'dask', 'netCDF4'};"
-        "assert not heavy & set(sys.modules), heavy & set(sys.modules)"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -19,33 +19,48 @@ HEAVY = ("numba", "matplotlib", "skimage", "dask", "xarray", "netCDF4", "scipy",
 SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints", "accuracy", "plotting")
 
 COMMAND = """
-import json, sys, time
-sys.path.insert(0, sys.argv.pop(1))
-started = time.process_time()
+import importlib, json, os, sys, time
+sys.path.insert(0, sys.argv[1])
+from fractalcontact.base.process import block_dask_import
 from fractalcontact.cli import main
-code = main(sys.argv[1:])
-cpu_time = time.process_time() - started
-import probe
-print(json.dumps({
-    "code": code, "kernels": probe.kernels(), "cpu_time": cpu_time,
-    "modules": sorted({name.split(".")[0] for name in sys.modules}),
-    "subpackages": sorted({name.split(".")[1] for name in sys.modules if name.startswith("fractalcontact.")}),
-}), file=sys.stderr)
+for libraries, words in json.loads(sys.argv[2]):
+    if libraries:
+        block_dask_import()
+    for name in libraries:
+        importlib.import_module(name)
+    if os.fork():
+        assert os.wait()[1] == 0, words
+        continue
+    started = time.process_time()
+    code = main(words)
+    cpu_time = time.process_time() - started
+    import probe
+    modules = [name for name in sys.modules if sys.modules[name]]
+    print(json.dumps({
+        "code": code, "kernels": probe.kernels(), "cpu_time": cpu_time,
+        "modules": sorted({name.split(".")[0] for name in modules}),
+        "subpackages": sorted({name.split(".")[1] for name in modules if name.startswith("fractalcontact.")}),
+    }), file=sys.stderr)
+    sys.stderr.flush()
+    os._exit(code)
 """
 
 
-def command_report(*words, **environment):
-    """Run the command in a process of its own; return what it imported and compiled."""
+def command_reports(*commands, **environment):
+    """Run commands, each in a process of its own; return what it imported and compiled.
+
+    A command is the libraries that are imported before, and are in all later processes too, and its words.
+    """
+    task = json.dumps([(libraries, list(map(str, words))) for libraries, words in commands])
     done = subprocess.run(
-        [sys.executable, "-c", COMMAND, str(Path(__file__).parent), *map(str, words)],
+        [sys.executable, "-c", COMMAND, str(Path(__file__).parent), task],
         capture_output=True,
         text=True,
         check=False,
         env=os.environ | {"FRACTALCONTACT_THREADS": "1"} | environment,  # all of it in this one process
     )
-    report = json.loads(done.stderr.splitlines()[-1])
-    assert report["code"] == 0, done.stderr
-    return report
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stderr.splitlines() if line.startswith('{"code"')]
 
 
 def compilations(report):
@@ -57,22 +72,6 @@ def scene(tmp_path, text):
     return tmp_path / "study.toml"
 
 
-def test_package_and_command_import_nothing_heavy():
-    code = "import sys, fractalcontact, fractalcontact.cli; print(sorted(set({heavy!r}) & set(sys.modules)))"
-    words = [sys.executable, "-c", code.format(heavy=(*HEAVY, "numpy"))]
-    assert subprocess.run(words, capture_output=True, text=True, check=True).stdout.strip() == "[]"
-
-
-def test_list_of_methods_imports_no_scipy():
-    assert not set(HEAVY) & set(command_report("methods")["modules"])
-
-
-def test_info_reads_a_file_without_xarray(tmp_path):
-    fc.save(fc.surfaces.fbm((16, 16), 1.0, hurst=0.5, rms_increment=1.0, rng=1), tmp_path / "surface.nc")
-    report = command_report("info", tmp_path / "surface.nc")
-    assert {"numba", "matplotlib", "skimage", "dask", "xarray", "scipy"} & set(report["modules"]) == set()
-
-
 SURFACE = SOUND.partition("[material]")[0]
 DIMENSION = SURFACE + '[want]\ndimensions = ["default"]\n'
 PRESSED = SURFACE + '[contact]\ncontact_modulus = 1e9\nnominal_pressure = 1e5\n[want]\ncontact = ["press"]\n'
@@ -81,8 +80,12 @@ PAPER = (
     + 'dimensions = ["default", "spectrum", "variogram", "cube_counts"]\n'
     + 'domains = ["box_dimension", "lacunarity"]\nkeep = ["state"]\n'
 )
+RIGID = SHIPPED.with_name("rigid_sliding.toml").read_text(encoding="utf-8")
+RIGID = RIGID.replace(SHIPPED.name, str(SHIPPED)).replace(
+    '"rigid_dilatancy"]', '"rigid_dilatancy", "friction"]'
+)
 WANTED = {
-    "rigid": (SOUND.replace('"closure", ', ""), {"surfaces", "joints"}),
+    "rigid": (RIGID, {"surfaces", "joints"}),
     "dimension": (DIMENSION, {"surfaces", "dimensions"}),
     "pressed": (PRESSED, {"surfaces", "contact"}),
     "closure": (SOUND, {"surfaces", "joints", "contact"}),
@@ -98,21 +101,47 @@ COMPILED = {
 }
 
 
+# what every study loads, and what every study with kernels does
+ALWAYS, COMPILER = ["xarray", "netCDF4", "jinja2"], ["numba", "scipy.linalg", "scipy.special"]
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory):
+    """What short commands, the studies of `WANTED` and the last study once more loaded and compiled."""
+    folder = tmp_path_factory.mktemp("reports")
+    fc.save(fc.surfaces.fbm((16, 16), 1.0, hurst=0.5, rms_increment=1.0, rng=1), folder / "surface.nc")
+    commands = {"methods": ([], ["methods"]), "info": ([], ["info", folder / "surface.nc"])}
+    for name, (text, _) in WANTED.items():
+        libraries = ALWAYS if name == "rigid" else COMPILER
+        (folder / name).mkdir()
+        commands[name] = libraries, ["run", scene(folder / name, text), "-o", folder / name, "--quiet"]
+    commands["again"] = [], [*commands["paper"][1][:3], folder / "again", "--quiet"]
+    return dict(zip(commands, command_reports(*commands.values()), strict=True))
+
+
+def test_list_of_methods_imports_no_scipy(reports):
+    assert not set(HEAVY) & set(reports["methods"]["modules"])
+
+
+def test_info_reads_a_file_without_xarray(reports):
+    unneeded = {"numba", "matplotlib", "skimage", "dask", "xarray", "scipy"}
+    assert unneeded & set(reports["info"]["modules"]) == set()
+
+
 @pytest.mark.parametrize("name", list(WANTED))
-def test_only_required_subpackages_and_kernels_are_loaded(tmp_path, name):
-    text, subpackages = WANTED[name]
-    report = command_report("run", scene(tmp_path, text), "-o", tmp_path / "out", "--quiet")
-    assert set(report["subpackages"]) & set(SUBPACKAGES) == subpackages
-    assert not {"matplotlib", "skimage", "dask.distributed", "tqdm"} & set(report["modules"])
+def test_only_required_subpackages_and_kernels_are_loaded(reports, name):
+    report = reports[name]
+    assert set(report["subpackages"]) & set(SUBPACKAGES) == WANTED[name][1]
+    assert not {"matplotlib", "skimage", "dask.distributed", "tqdm", "pyamg"} & set(report["modules"])
     kernels = report["kernels"]
     assert Counter(kernel.partition(".")[0] for kernel in kernels) == COMPILED[name], list(kernels)
     assert all(forms == 1 for forms, _ in kernels.values())
+    assert ("numba" in report["modules"]) == (name != "rigid")
 
 
-def test_second_run_compiles_nothing(tmp_path):
-    path = scene(tmp_path, SOUND)
-    fc.scenes.run(path, progress=False)  # in this process, which fills the cache of the next one
-    assert compilations(command_report("run", path, "-o", tmp_path / "out", "--quiet")) == 0
+def test_second_run_compiles_nothing(reports):
+    assert compilations(reports["again"]) == 0
+    assert reports["again"]["kernels"].keys() == reports["paper"]["kernels"].keys()
 
 
 LONG = """
@@ -150,9 +179,8 @@ def test_memory_of_scalar_results_is_independent_of_path_length(tmp_path, monkey
 def test_cold_cache_fills_in_five_seconds(tmp_path):
     words = ("run", "concrete_crack", "--quiet")
     cache_folder = str(tmp_path / "numba")
-    cold, warm = (
-        command_report(*words, "-o", tmp_path / name, NUMBA_CACHE_DIR=cache_folder)
-        for name in ("cold", "warm")
+    cold, warm = command_reports(
+        *(([], [*words, "-o", tmp_path / name]) for name in ("cold", "warm")), NUMBA_CACHE_DIR=cache_folder
     )
     print(f"cold: {compilations(cold)} kernels, {cold['cpu_time']:.1f} s; warm: {warm['cpu_time']:.1f} s")
     assert compilations(warm) == 0

@@ -1,7 +1,6 @@
 """A scene run from end to end: only the wanted results, one valid file, resumed where it stopped."""
 
 import pickle
-import subprocess
 import sys
 from concurrent.futures import Executor, Future
 from types import SimpleNamespace
@@ -129,18 +128,6 @@ def test_info_names_the_calls_that_made_a_surface(tmp_path):
     last = file_contents(path).splitlines()[-1]
     assert last.startswith("call fractalcontact.surfaces.sample")
     assert last.endswith(", after fractalcontact.surfaces.from_array")
-
-
-def test_rigid_sliding_imports_no_solver_and_no_compiler(tmp_path):
-    heavy = ("numba", "matplotlib", "skimage", "fractalcontact.contact", "fractalcontact.plotting")
-    code = (
-        "import sys; from fractalcontact.cli import main\n"
-        "assert main(['run', 'rigid_sliding', '-o', sys.argv[1], '--quiet']) == 0\n"
-        f"print([m for m in {heavy!r} if m in sys.modules])"
-    )
-    words = [sys.executable, "-c", code, str(tmp_path)]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 def test_failed_run_resumes_from_kept_stages(tmp_path, monkeypatch):

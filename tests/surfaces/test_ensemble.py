@@ -1,8 +1,6 @@
-"""Properties of every generator: shape, streams, members, units, files; import without heavy libraries."""
+"""Properties of every generator: shape, streams, members, units, files."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -77,14 +75,3 @@ def test_results_are_cf_compliant_and_round_trip(name, tmp_path, compliance):
     fc.save(result, tmp_path / "a.nc")
     assert compliance(tmp_path / "a.nc") == []
     xr.testing.assert_identical(fc.open(tmp_path / "a.nc"), result)
-
-
-def test_subpackage_loads_no_heavy_library():
-    code = (
-        "import sys, numpy, fractalcontact.surfaces as s;"
-        "[getattr(s, n) for n in s.__all__ if n != 'from_points'];"
-        "heavy = {'numba', 'matplotlib', 'skimage', 'dask', 'netCDF4', 'SurfaceTopography'};"
-        "print(sorted(heavy & set(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"
