@@ -165,6 +165,11 @@ CELL = 8e-5  # m
 
 def signature_of(domain):
     """Return a study that holds nothing but the signature of the domains `domain(shear, step)`."""
+    return signatures(domain).copy()
+
+
+@cache
+def signatures(domain):
     states = np.array([[domain(i, k) for k in range(len(LOADS))] for i in range(len(SHEARS))])
     places = (np.arange(states.shape[-1]) + 0.5) * CELL
     coords = {"shear": SHEARS, "nominal_pressure": ("step", LOADS), "y": places, "x": places}
@@ -180,10 +185,11 @@ def discs(count, radius, seed, groups=None, n=256):
     if groups:
         parents = rng.random((groups, 2))
         centres = parents[rng.integers(0, groups, count)] + rng.standard_normal((count, 2)) / 16
-    cells = np.zeros((n, n), bool)
-    for y, x in centres * n:
-        rows, columns = ((np.arange(n) + 0.5 - centre + n / 2) % n - n / 2 for centre in (y, x))
-        cells |= rows[:, None] ** 2 + columns**2 <= radius**2
+    cells, around = np.zeros((n, n), bool), np.arange(-np.ceil(radius), np.ceil(radius) + 1, dtype=int)
+    for centre in centres * n:
+        rows, columns = (place + around for place in np.floor(centre).astype(int))
+        squares = [(places + 0.5 - at) ** 2 for places, at in zip((rows, columns), centre, strict=True)]
+        cells[np.ix_(rows % n, columns % n)] |= squares[0][:, None] + squares[1] <= radius**2
     return cells
 
 

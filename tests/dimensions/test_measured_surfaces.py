@@ -114,7 +114,7 @@ def test_coverage(kind):
     assert known >= 14
 
 
-@pytest.mark.parametrize("hurst", [0.2, 0.5])
+@pytest.mark.parametrize("hurst", [0.2, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_rounded_heights_have_no_seams(hurst):
     """Squared steps of rounded heights are few numbers, whose medians jump from line to line."""
     found = [estimated(0.5 * np.rint(2.0 * brownian(hurst, seed))) for seed in range(5)]
@@ -145,7 +145,7 @@ def test_known_blur_and_noise_narrow_the_interval():
     assert float(known.noise_height) == pytest.approx(0.05 * STEP)
 
 
-@pytest.mark.parametrize("hurst", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("hurst", [0.3, pytest.param(0.6, marks=pytest.mark.slow), 0.9])
 def test_one_row_fewer_moves_the_estimate_by_less_than_its_error(hurst):
     for heights in (brownian(hurst, 5), inner(gaussian_filter(brownian(hurst, 5, margin=MARGIN), 1.0))):
         whole, cropped = estimated(heights), estimated(heights[:-1])
@@ -234,7 +234,9 @@ def drawn(seed):
     return (heights if shape[0] > 1 else heights[0]) * 10.0 ** rng.integers(-9, 6)
 
 
-@pytest.mark.parametrize("part", range(4))
+@pytest.mark.parametrize(
+    "part", [0, 1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)]
+)
 def test_any_surface_has_an_estimate_or_a_reason(part):
     for seed in range(10 * part, 10 * part + 10):
         heights = drawn(seed)
@@ -281,7 +283,7 @@ def test_elongated_surfaces(shape, hurst):
     assert sum(held) >= 5
 
 
-@pytest.mark.parametrize("steps", [17.0, 5.0, 3.0])
+@pytest.mark.parametrize("steps", [17.0, pytest.param(5.0, marks=pytest.mark.slow), 3.0])
 def test_rounded_heights_keep_their_interval_when_levelled(steps):
     surface = fc.surfaces.fbm((256, 256), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
     step = float(np.diff(surface.values, 2).std()) / steps

@@ -236,8 +236,8 @@ def audit(scene):
     requirement = requirements(scene)
     with tempfile.TemporaryDirectory(prefix="fractalcontact-") as folder:
         place = Path(folder)
+        cold = _in_process(place / "cold", {"scene": scene}, place / "kernels")  # a wrong scene ends here
         bare = _in_process(place / "bare", {"libraries": requirement.libraries})
-        cold = _in_process(place / "cold", {"scene": scene}, place / "kernels")
         warm = _in_process(place / "warm", {"scene": scene, "traced": True}, place / "kernels")
     libraries, kernels, stages = warm["libraries"], sorted(cold["kernels"]), list(warm["stages"])
     forms = np.array([cold["kernels"][name][0] for name in kernels], dtype=int)
