@@ -105,7 +105,7 @@ def study(tmp_path_factory):
             lower="lower.nc",
             upper='[upper]\nread = "upper.nc"' if "upper" in faces else "",
             edge=edge,
-            part=edge / 2,
+            part=edge / 4,
             forces=", ".join(f"{pressure * edge**2:.9g}" for pressure in (2.5e6, 25e6, 75e6)),
         )
         (folder / "study.toml").write_text(text, encoding="utf-8")

@@ -223,10 +223,11 @@ def test_noise_and_blur_give_one_exponent_in_all_directions(hurst, noise, blur):
         assert bool((held | np.isnan(result["ci_low"])).all())
 
 
+@pytest.mark.parametrize("seeds", [range(20, 23), pytest.param(range(23, 28), marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("noise", "blur"), [(0.3, 0.0), (0.0, 0.5), (0.05, 1.0)])
-def test_no_interval_where_blur_or_noise_bends_the_lags(noise, blur):
+def test_no_interval_where_blur_or_noise_bends_the_lags(noise, blur, seeds):
     """The exponent would be .65 (noise of 0.3), .88 (blur of 0.5), without a sign of it."""
-    for seed in range(20, 28):
+    for seed in seeds:
         result = fc.dimensions.directions(measured(128, 0.7, seed, noise, blur))
         assert np.isnan(result["ci_low"]).all()
         assert np.isnan(result["anisotropy_ratio"])
@@ -356,7 +357,9 @@ def test_no_interval_where_the_lags_are_bent():
     assert result.isotropy_p_value < 0.01
 
 
-@pytest.mark.parametrize("seed", range(20, 40))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=[] if seed < 28 else pytest.mark.slow) for seed in range(20, 40)]
+)
 def test_directions_of_a_surface_of_which_little_was_observed(seed):
     """Two lags that were observed are interpolated to three: their scatter is singular."""
     stream = np.random.default_rng(seed)
@@ -369,7 +372,12 @@ def test_directions_of_a_surface_of_which_little_was_observed(seed):
 
 @pytest.mark.parametrize(
     ("points", "hurst", "missing", "scales"),
-    [(40, 0.2, 0.0, None), (40, 0.8, 0.0, None), (40, 0.2, 0.2, None), (160, 0.6, 0.0, (3.4e-3, 1.4e-2))],
+    [
+        (40, 0.2, 0.0, None),
+        pytest.param(40, 0.8, 0.0, None, marks=pytest.mark.slow),
+        (40, 0.2, 0.2, None),
+        (160, 0.6, 0.0, (3.4e-3, 1.4e-2)),
+    ],
 )
 @pytest.mark.parametrize(("members", "slack"), [(30, 0.4), pytest.param(60, 0.3, marks=pytest.mark.slow)])
 def test_standard_error_is_the_scatter(points, hurst, missing, scales, members, slack):

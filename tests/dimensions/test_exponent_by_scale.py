@@ -62,16 +62,15 @@ def test_crop_of_a_periodic_surface_is_measured_without_aliases():
     assert ((result.ci_low < 0.3) & (result.ci_high > 0.3))[:, :2].mean() > 0.7
 
 
-@pytest.mark.parametrize("tilt", [0.0, 1e-6])
-def test_profile_is_not_changed_by_a_tilt(tilt):
+def test_profile_is_not_changed_by_a_tilt():
     heights = brownian(0.5, 1e-6, 2, (1000,))
-    result = scaling(heights + tilt * np.arange(1000))
+    result = scaling(heights + 1e-6 * np.arange(1000))
     assert float(result.window_hurst) == pytest.approx(0.5, abs=0.06)
     np.testing.assert_allclose(result.hurst, scaling(heights).hurst, atol=1e-6)
 
 
-# of 30 intervals of 95 %, fewer than 26 hold in one case of 60
-@pytest.mark.parametrize(("members", "least"), [(30, 0.84), pytest.param(100, 0.88, marks=pytest.mark.slow)])
+# of 16 intervals of 95 %, fewer than 14 hold in one case of 23
+@pytest.mark.parametrize(("members", "least"), [(16, 0.84), pytest.param(100, 0.88, marks=pytest.mark.slow)])
 def test_coverage_of_octaves(members, least):
     rng = np.random.default_rng(5)
     surfaces = fc.surfaces.fbm((64, 64), SPACING, hurst=0.4, rms_increment=1e-6, members=members, rng=rng)
@@ -100,16 +99,17 @@ def test_gaps_change_no_octave_by_more_than_its_error():
         assert float(result.window_ci_low) < 0.4 < float(result.window_ci_high)
 
 
-def test_window_beside_a_blur_holds_the_exponent():
+@pytest.mark.parametrize(("seeds", "least"), [(6, 5), pytest.param(12, 9, marks=pytest.mark.slow)])
+def test_window_beside_a_blur_holds_the_exponent(seeds, least):
     """Without the octave that the blur still bends: with it no interval holds 0.5."""
     inside = 0
-    for seed in range(12):
+    for seed in range(seeds):
         surface = fc.surfaces.fbm((160, 160), 1e-4, hurst=0.5, rms_increment=1e-6, rng=300 + seed)
         blurred = surface.copy(data=gaussian_filter(surface.values, 1.2))[16:-16, 16:-16]
         result = fc.dimensions.scaling(blurred)
         assert float(result.hurst[0]) > 0.9  # the octave shows the blur
         inside += float(result.window_ci_low) <= 0.5 <= float(result.window_ci_high)
-    assert inside >= 9
+    assert inside >= least
 
 
 def test_blur_is_not_taken_for_missing_aliases():

@@ -39,8 +39,10 @@ def test_tilt_row_offsets_and_mirror(rough):
     np.testing.assert_allclose(mirrored.hurst, whole.hurst, atol=1e-3)
 
 
-@pytest.mark.parametrize("axis", [0, 1])
-@pytest.mark.parametrize("hurst", [0.3, 0.7])
+@pytest.mark.parametrize(
+    ("hurst", "axis"),
+    [(0.3, 0), (0.7, 1), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.3, 1), (0.7, 0)))],
+)
 def test_stretched_surface_keeps_its_exponent(hurst, axis):
     """Once .10 too low at H = .3, with one interval in ten that held it: aliases along the axis differ."""
     errors = []
@@ -65,10 +67,13 @@ def test_interval_of_a_sum_of_two_surfaces_holds_the_smaller_exponent():
     assert sum(held) >= 5
 
 
-@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
-def test_surface_and_its_transpose_have_one_estimate(hurst):
+@pytest.mark.parametrize(
+    ("hurst", "seeds"),
+    [(0.2, 3), (0.8, 3), *(pytest.param(hurst, 8, marks=pytest.mark.slow) for hurst in (0.2, 0.5, 0.8))],
+)
+def test_surface_and_its_transpose_have_one_estimate(hurst, seeds):
     """Once .252 and .229: modes along one axis alone were left out, those along the other were not."""
-    for seed in range(8):
+    for seed in range(seeds):
         heights = fc.surfaces.fbm((48, 48), 1e-4, hurst=hurst, rms_increment=1e-6, rng=seed).values
         one, other = (estimate_one(surface_of(each)) for each in (heights, heights.T))
         for name in ("hurst", "ci_low", "ci_high"):
@@ -113,9 +118,10 @@ def test_cut_off_below_noise():
     assert str(limited.reason.values[0]) or limited.ci_low.item() < 0.5 < limited.ci_high.item()
 
 
-def test_short_rolloff_of_profile():
+@pytest.mark.parametrize("members", [14, pytest.param(30, marks=pytest.mark.slow)])
+def test_short_rolloff_of_profile(members):
     surfaces = fc.surfaces.spectral(
-        512, 1.0, hurst=0.5, rms_height=1.0, rolloff=64.0, short_cutoff=4.0, rng=5, members=30
+        512, 1.0, hurst=0.5, rms_height=1.0, rolloff=64.0, short_cutoff=4.0, rng=5, members=members
     )
     result = fc.dimensions.estimate(surfaces)
     covered = (result["ci_low"] <= 0.5) & (result["ci_high"] >= 0.5)
