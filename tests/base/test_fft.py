@@ -48,7 +48,6 @@ def test_thread_settings_change_no_bit(library):
     }
     limits = (
         {"FRACTALCONTACT_THREADS": "1"},
-        {"FRACTALCONTACT_THREADS": "2"},
         {"FRACTALCONTACT_THREADS": "3", "OMP_NUM_THREADS": "2"},
         {"FRACTALCONTACT_THREADS": "7", "OMP_NUM_THREADS": "1"},
     )

@@ -48,7 +48,7 @@ def test_bits_independent_of_units_and_threads(library, monkeypatch, single, bou
     monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0 if single else 10**9)
     monkeypatch.setattr(threads, "SHARE", 1000)  # so that small passes are shared among threads too
     monkeypatch.setattr(fft, "SMALL", 1000)
-    surface, keep = rough(112), ("state", "pressure", "gap", "displacement")
+    surface, keep = rough(64), ("state", "pressure", "gap", "displacement")
     path = (
         {"nominal_pressure": MODULUS * np.array([1e-3, 4e-3, 2e-3])} if force else {"closure": [2e-5, 3e-5]}
     )

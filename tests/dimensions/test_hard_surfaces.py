@@ -102,7 +102,7 @@ def test_what_is_said_of_a_map_does_not_depend_on_its_orientation(damage):
     heights = fc.surfaces.fbm((384, 384), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1).values.copy()
     heights = damage(heights)
     reasons, exponents = set(), []
-    for turned in (heights, heights.T, heights[::-1], heights[:, ::-1]):  # all others follow one another
+    for turned in (heights, heights.T, heights[::-1]):  # all others follow one another
         surface = fc.surfaces.from_array(np.ascontiguousarray(turned), 1e-4)
         result = fc.dimensions.estimate(surface)
         reasons.add(str(result.reason.values[0]))

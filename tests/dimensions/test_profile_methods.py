@@ -99,10 +99,11 @@ def test_steep_profiles_have_the_divider_dimension_of_their_graph():
     assert "unit of height" in str(steep.note.values)
 
 
+@pytest.mark.parametrize("members", [30, pytest.param(60, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("method", ["higuchi", "detrended_fluctuation", "roughness_length", "spectrum"])
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
-def test_intervals_hold_the_exponent_of_profiles(method, hurst):
-    profiles = fc.surfaces.fbm((1024,), 1e-4, hurst=hurst, rms_increment=1e-6, rng=1000, members=60)
+def test_intervals_hold_the_exponent_of_profiles(method, hurst, members):
+    profiles = fc.surfaces.fbm((1024,), 1e-4, hurst=hurst, rms_increment=1e-6, rng=1000, members=members)
     result = fc.dimensions.estimate(profiles, method).isel(method=0)
     given = np.isfinite(result.ci_low)
     if (method, hurst) == ("higuchi", 0.8):

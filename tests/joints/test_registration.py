@@ -1,5 +1,6 @@
 """Registration of two faces: known motions, noise, gaps, and the measured gneiss pair."""
 
+import functools
 import json
 import os
 from pathlib import Path
@@ -200,6 +201,20 @@ def gneiss(make_face):
     return faces
 
 
+@pytest.fixture(scope="module")
+def mated(gneiss):
+    """Return a function: the filled faces and their registration, as scanned or despiked; each done once."""
+
+    @functools.cache
+    def register(despiked):
+        faces = [gneiss[side] for side in ("side_a", "side_b")]
+        faces = [fc.surfaces.despike(face) for face in faces] if despiked else faces
+        lower, upper = map(fc.surfaces.fill, faces)
+        return faces, lower, fc.joints.register(lower, upper)
+
+    return register
+
+
 @measured
 def test_gneiss_pair_is_mated(gneiss):
     lower, upper = gneiss["side_a"], gneiss["side_b"]
@@ -218,15 +233,13 @@ def test_gneiss_pair_is_mated(gneiss):
 
 
 @measured
-def test_despiked_gneiss_closes_to_the_published_aperture(gneiss):
+def test_despiked_gneiss_closes_to_the_published_aperture(gneiss, mated):
     aperture = gneiss["aperture"]
     published = np.sort(aperture.values[np.isfinite(aperture.values)])
     closed, removed = {}, []
-    for name, clean in (("as scanned", lambda face: face), ("despiked", fc.surfaces.despike)):
-        faces = [clean(gneiss[side]) for side in ("side_a", "side_b")]
+    for name, despiked in (("as scanned", False), ("despiked", True)):
+        faces, lower, result = mated(despiked)
         removed += [int(face.removed_points) for face in faces if "removed_points" in face.coords]
-        lower, upper = (fc.surfaces.fill(face) for face in faces)
-        result = fc.joints.register(lower, upper)
         crack = fc.joints.Crack(lower, result.height, young=60e9, poisson=0.2, block=0.045)
         closing = fc.joints.closure(crack, shear=0.0, normal_force=[1e4])
         closed[name] = (result, float(closing.interface_closure.item()), float(closing.mean_gap.item()))
@@ -244,14 +257,14 @@ def test_despiked_gneiss_closes_to_the_published_aperture(gneiss):
 
 
 @measured
-def test_cliff_locks_the_gneiss_pair_towards_west(gneiss):
+def test_cliff_locks_the_gneiss_pair_towards_west(gneiss, mated):
     faces = {side: gneiss[f"side_{side}"].values for side in "ab"}
     for heights in faces.values():  # 14 mm long, a few millimetres high, steeper than 70 degrees, as scanned
         falls = -np.diff(heights[50:95, 154:168], axis=1)
         assert np.nanmedian(np.nanmax(falls, axis=1)) > np.tan(np.radians(70)) * 3e-4
         assert np.ptp(np.quantile(154 + np.nanargmax(np.nan_to_num(falls), axis=1), [0.1, 0.9])) <= 5
-    lower, upper = (fc.surfaces.fill(fc.surfaces.despike(gneiss[side])) for side in ("side_a", "side_b"))
-    upper = fc.joints.register(lower, upper).height
+    _, lower, registered = mated(True)
+    upper = registered.height
     climbs = {}
     for name, part in (("whole", slice(None)), ("west of it", slice(0, 156))):
         faces = (lower.isel(x=part), upper.isel(x=part))
@@ -263,9 +276,8 @@ def test_cliff_locks_the_gneiss_pair_towards_west(gneiss):
 
 
 @measured
-def test_study_of_the_gneiss_pair(gneiss):
-    lower = fc.surfaces.fill(gneiss["side_a"])
-    registered = fc.joints.register(lower, fc.surfaces.fill(gneiss["side_b"]))
+def test_study_of_the_gneiss_pair(mated):
+    _, lower, registered = mated(False)
     crack = fc.joints.Crack(lower, registered.height, young=60e9, poisson=0.2, block=0.045)
     shear = [0.0, 3e-4, 1.5e-3]
     opening = fc.joints.dilatancy(crack, shear=shear, direction=("E", "W"), normal_force=[1e3, 1e4])
@@ -320,7 +332,7 @@ def test_swapped_faces_are_refused(make_face, rough):
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 def test_face_scanned_face_up_is_recognised_and_turned_over(make_face, rough, axis):
-    lower, upper = moved_pair(rough, (3.0, -2.0), noise=0.02)
+    lower, upper = moved_pair(rough, (3.0, -2.0), noise=0.02, size=90)
     turned = -upper[::-1] if axis == "x" else -upper[:, ::-1]
     faces = make_face(lower, S), make_face(turned, S)
     with pytest.raises(ValueError, match=f"scanned face up: it fits with turn_upper='{axis}'"):
