@@ -244,7 +244,10 @@ def _draw_all(tree: xr.DataTree, folder: Path, progress: bool, formats: Sequence
             figure = figure_of(draw_with_band(drawings, members) if members else drawings[0]())
             for file in files[number]:
                 _write(figure, file)
-            figure.clear()
+            if not small:  # the next one may come before the garbage of this one is collected
+                figure.clear()
+
+    import matplotlib.backends.backend_agg  # before the process is copied  # noqa: F401
 
     small = sum(node.nbytes for node in tree.subtree) < LARGE
     drawn = calls_in_two_processes(draw_one, len(rows)) if small else map(draw_one, range(len(rows)))
@@ -297,7 +300,7 @@ def _write(figure: Figure, target: Path) -> None:
         figure.set_layout_engine("none")
     with written_whole(target) as temporary:
         if target.suffix == ".png":
-            canvas.print_png(temporary, metadata=SOFTWARE, pil_kwargs={"compress_level": 4})  # type: ignore[no-untyped-call]
+            canvas.print_png(temporary, metadata=SOFTWARE, pil_kwargs={"compress_level": 2})  # type: ignore[no-untyped-call]
         else:
             date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
             figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})

@@ -10,7 +10,7 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -138,12 +138,16 @@ def report(
 
 
 def write_report(
-    tree: xr.DataTree, target: Path, figures: Sequence[str | os.PathLike[str]], summary: Summary
+    tree: xr.DataTree,
+    target: Path,
+    figures: Sequence[str | os.PathLike[str]],
+    summary: Summary,
+    contents: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write the report with these pictures and this summary."""
+    """Write the report with these pictures, this summary and the `page_contents`, computed if not given."""
     with ThreadPoolExecutor(thread_count()) as pool:  # the encoder releases the interpreter lock
         pictures = list(pool.map(_picture_file, map(Path, figures)))
-    text = _page(tree, pictures, summary, target)
+    text = _page(tree, pictures, summary, contents or page_contents(tree), target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -158,12 +162,27 @@ def _study(path: str | os.PathLike[str]) -> xr.DataTree:
     return tree  # type: ignore[no-any-return]
 
 
-def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summary, target: Path) -> str:
+def page_contents(tree: xr.DataTree) -> dict[str, Any]:
+    """Return what the page shows beside the figures and the summary: the surface, the maps and the curves."""
+    single = of_member(tree, 0)
+    return {
+        "surface": _surface(single),
+        "maps": list(_maps(single)),
+        "curves": [_curve_table(name, frame) for name, frame in _curves(tree).items()],
+    }
+
+
+def _page(
+    tree: xr.DataTree,
+    figures: Sequence[tuple[str, bytes]],
+    summary: Summary,
+    contents: Mapping[str, Any],
+    target: Path,
+) -> str:
     """Return the text of the page."""
     from jinja2 import Environment  # here: a study without a folder has no report
 
     template = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
-    single = of_member(tree, 0)
     pages = {name: page for name in _scans(tree) if (target.parent / (page := page_of(name))).is_file()}
     entry = provenance_of(tree)
     scene = scene_of(tree)
@@ -175,8 +194,6 @@ def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summ
         subtitle=" · ".join(str(part) for part in subtitle if part),
         generator=str(tree.attrs.get("source", "fractalcontact")),
         of_member="Member 0 of the ensemble." if member_count(tree) else "",
-        surface=_surface(single),
-        maps=list(_maps(single)),
         figures=[
             (name.replace("_", " ").capitalize(), base64.b64encode(content).decode())
             for name, content in figures
@@ -184,10 +201,10 @@ def _page(tree: xr.DataTree, figures: Sequence[tuple[str, bytes]], summary: Summ
         summary=summary,
         written_rows=written_rows,
         pages=pages,
-        curves=[_curve_table(name, frame) for name, frame in _curves(tree).items()],
         scene=_as_json(scene) if scene else "",
         provenance=_as_json(entry),
         references=str(tree.attrs.get("references", "")),
+        **contents,
     )
 
 

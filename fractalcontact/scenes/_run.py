@@ -9,6 +9,7 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +20,7 @@ import xarray as xr
 from fractalcontact.base import netcdf, provenance, schema, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
+from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.references import joined_references, provenance_of
 from fractalcontact.base.study import of_member
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
@@ -27,7 +29,7 @@ from fractalcontact.scenes import _results_folder
 from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
-from fractalcontact.scenes._html_report import write_report
+from fractalcontact.scenes._html_report import page_contents, write_report
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, main_results, pictured, pooled
 from fractalcontact.scenes._plan import check_memory, stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
@@ -240,16 +242,19 @@ def _run(
     netcdf.save(tree, folder / RESULT)
     (folder / PARTIAL_RESULT).unlink(missing_ok=True)
     with _beside_the_result():
-        figures = []
+        figures, contents = [], None
         if scene.want.figures:
-            figures = _draw(tree, folder, progress)
+            # a copy of this process prepares the page meanwhile
+            calls = partial(_draw, tree, folder, progress), partial(page_contents, tree)
+            results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
+            figures, contents = results[0], results[1]
             _note_run_time(tree, start)
             _results_folder.remove_old_figures(folder, figures)
         whole = summary_of(tree)
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         netcdf.replace_attributes(folder / RESULT, changed)
-        write_report(tree, folder / _results_folder.REPORT, figures, whole)
+        write_report(tree, folder / _results_folder.REPORT, figures, whole, contents)
         if scene.want.datasheet and not failed:
             tables(tree, folder / _results_folder.TABLES)
             _draw_datasheet(tree, folder / _results_folder.DATASHEET)

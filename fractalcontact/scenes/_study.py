@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -154,18 +155,19 @@ class Study:
                 tasks |= self._tasks(stage)
             except Exception as error:
                 self._fail(stage.name, error)
-        several, so_far = len(tasks) > 1, sum(self.spent.values())
+        several = len(tasks) > 1
         workers = self.workers if several else None
-        finished = run_tasks(tasks, self.store, stop, workers, points=self._points, spent=so_far)
         show = self.progress and several
-        bar = track(finished, show, self.scene.name, unit="part", total=len(tasks))
-        for key, (results, seconds) in bar:
-            for name, result, spent in zip(tasks[key].stages, results, seconds, strict=True):
-                if isinstance(result, Exception):
-                    self._fail(name, result)
-                else:
-                    self.parts[name][key[1]] = result
-                self.spent[name] = self.spent.get(name, 0.0) + spent
+        # closed after an error too: parts that a copy of this process has begun are kept
+        with closing(run_tasks(tasks, self.store, stop, workers, points=self._points)) as finished:
+            bar = track(finished, show, self.scene.name, unit="part", total=len(tasks))
+            for key, (results, seconds) in bar:
+                for name, result, spent in zip(tasks[key].stages, results, seconds, strict=True):
+                    if isinstance(result, Exception):
+                        self._fail(name, result)
+                    else:
+                        self.parts[name][key[1]] = result
+                    self.spent[name] = self.spent.get(name, 0.0) + spent
         for stage in (stage for stage in stages if stage.name not in self.failures):
             self.spent.setdefault(stage.name, 0.0)
             joined = self.works[stage.name].join(self.parts[stage.name])

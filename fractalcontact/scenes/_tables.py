@@ -104,7 +104,7 @@ def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
 
 def heading(dataset: xr.Dataset, name: str) -> str:
     """Return the name of a variable with its unit."""
-    attributes = dataset[name].attrs if name in dataset.variables else {}
+    attributes = dataset.variables[name].attrs if name in dataset.variables else {}
     quantity = QUANTITIES.get(name)
     units = attributes.get("units", quantity.units if quantity else "") or ""
     return f"{name} ({units})" if units not in ("", "1") else name

@@ -1,5 +1,6 @@
 """Peak memory of the process, calls shared with a copy of it, and saving a file without importing dask."""
 
+import gc
 import multiprocessing
 import os
 import subprocess
@@ -66,6 +67,8 @@ def test_every_call_is_made_once_by_one_of_two_processes(note):
     callers = note.callers()
     assert all(len(each) == 1 for each in callers)
     assert len({each[0] for each in callers}) == (2 if alone() else 1)
+    assert callers[0] == [str(os.getpid())]
+    assert gc.get_freeze_count() == 0
 
 
 @pytest.mark.parametrize("end", [lambda: os._exit(1), lambda: 1 / 0])
