@@ -13,9 +13,9 @@ from fractalcontact.base.references import scene_of
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of
 from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
+from fractalcontact.scenes._joint_rows import aperture_as_placed
 from fractalcontact.scenes._overview import OVERVIEW
 from fractalcontact.scenes._result_tables import length
-from fractalcontact.scenes._rows import aperture_as_placed
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

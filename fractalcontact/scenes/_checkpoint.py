@@ -174,12 +174,12 @@ def with_seeds(scene: Scene, store: PartStore) -> Scene:
     return replace(scene, tables={**scene.tables, **tables})
 
 
-def digest(stage: Stage, scene: Scene, digests: Mapping[str, str], dropped: tuple[str, ...]) -> str:
+def digest(stage: Stage, scene: Scene, digests: Mapping[str, str]) -> str:
     """Return a digest of all that can change the result of a stage, and of nothing else."""
     row = stage.row
     facts: dict[str, Any] = {
         "version": fractalcontact.__version__,
-        "keep": [word for word in stage.keep if word not in dropped],
+        "keep": [word for word in stage.keep if word not in stage.dropped],
         "options": stage_options(scene, row),
     }
     if row.takes == "file":

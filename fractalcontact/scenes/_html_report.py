@@ -28,7 +28,7 @@ from fractalcontact.base.study import group_of, member_count, of_member
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
-from fractalcontact.scenes import _rows
+from fractalcontact.scenes import _domain_rows
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, page_of, pictured
 from fractalcontact.scenes._result_tables import SCAN, spread, table_of
 from fractalcontact.scenes._results_folder import REPORT, is_report
@@ -338,7 +338,7 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
     window = across(np.array([signature[name].values for name in ("window_low", "window_high")]))
     decades = 10.0 ** np.arange(-3, 6)[:, None] * SIZES
     written = [value for value in decades.ravel() if side[0] <= value * scale.factor <= side[-1]]
-    rows = table_of(replace(_rows.signature, first_dim=False), tree, signature)
+    rows = table_of(replace(_domain_rows.signature, first_dim=False), tree, signature)
     cells = [list(zip(rows.heads, row, strict=True)) for row in rows.cells] if rows else []
     return {
         "curves": polylines(local),

@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.random_effects import random_effects
 from fractalcontact.base.robust import is_far
 from fractalcontact.base.study import MEMBER, group_of
-from fractalcontact.scenes import _rows
+from fractalcontact.scenes import _joint_rows
 from fractalcontact.scenes._result_tables import (
     SCAN,
     Column,
@@ -51,7 +51,7 @@ def _main(head: str, name: str, decimals: int | None, *groups: str, beside: tupl
 ENDS = (f"{DIMENSION}_low", f"{DIMENSION}_high")
 MAIN = (
     _main("dimension D", DIMENSION, 3, "dimensions", beside=(*ENDS, ERROR)),
-    Main(_rows.roughness_coefficient.columns[0], JRC, ("joints/roughness_coefficient",)),
+    Main(_joint_rows.roughness_coefficient.columns[0], JRC, ("joints/roughness_coefficient",)),
     _main("Sq", "rms_height", None, "surfaces/description"),
     _main("largest contact area", "contact_fraction", None, "contact", "joints/closure"),
     _main("largest closure", "interface_closure", None, "joints/closure"),

@@ -284,6 +284,17 @@ def spread(count: int, most: int) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
+def at_value(name: str, dim: str, value: Any) -> Any:
+    """Return a function that takes a variable at one value of a dim; None where there is none."""
+
+    def take(state: xr.Dataset) -> Any:
+        if name not in state or dim not in state.coords or value not in state[dim].values:
+            return None
+        return state[name].sel({dim: value})
+
+    return take
+
+
 def finite(data: Any) -> Array:
     """Return the finite values."""
     values = np.asarray(data.values, dtype=float)

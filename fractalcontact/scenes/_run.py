@@ -31,11 +31,12 @@ from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import page_contents, write_report
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, main_results, pictured, pooled
-from fractalcontact.scenes._plan import check_memory, stages_of
+from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
 from fractalcontact.scenes._scan_files import scans_of
 from fractalcontact.scenes._scans import PARTIAL, ScanStudies
 from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._stage_memory import check_memory
 from fractalcontact.scenes._stages import FIGURES
 from fractalcontact.scenes._study import Study, study_ensemble
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text

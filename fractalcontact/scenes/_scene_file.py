@@ -17,8 +17,9 @@ from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.units import pascals
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
 from fractalcontact.scenes import _scene_keys
-from fractalcontact.scenes._plan import check_needs, stages_of
-from fractalcontact.scenes._scene import MATERIAL_KEYS, Scene, Table
+from fractalcontact.scenes._options import FROM_MATERIAL, given_options, loads_of
+from fractalcontact.scenes._plan import stages_of
+from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, Scene, Table
 from fractalcontact.scenes._scene_keys import Keys
 from fractalcontact.scenes._stages import PARTIAL_SLIP, STAGES
 
@@ -224,7 +225,7 @@ def _check(scene: Scene, problems: Problems) -> None:
         problems.add("want", "a table that names at least one result", NONE)
     if not any(argument.startswith("want") for argument in problems.arguments):
         _check_needed_tables(scene, problems)
-        check_needs(scene, problems)
+        _check_needs(scene, problems)
 
 
 def _check_surface(table: Table, name: str, problems: Problems) -> None:
@@ -273,6 +274,32 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     if slips:
         expected = "no hardness: partial slip is that of elastic bodies"
         problems.require("hardness" not in material, "material.hardness", expected, "a value")
+
+
+def _check_needs(scene: Scene, problems: Problems) -> None:
+    """Note what a stage needs and the scene does not give, and loads and directions that are ambiguous."""
+    material = set(scene.table("material"))
+    for stage in stages_of(scene):
+        row, name, reason = stage.row, stage.row.word or stage.name, stage.reason
+        if not row.table or row.takes == "file":
+            continue
+        options = given_options(scene, row)
+        for key in row.needed():
+            sources, _ = FROM_MATERIAL.get(key, ((), None))
+            if key in options or (sources and material >= set(sources)):
+                continue
+            place = "joint" if key in (*LOADS, "shear", "block") else row.table
+            if key.endswith("friction_angle"):
+                place, key, sources = "material", "basic_friction_angle", ()
+            elsewhere = f", or {' and '.join(sources)} in [material]" if sources else ""
+            problems.add(f"{place}.{key}", f"a value for {name} ({reason}){elsewhere}", NONE)
+        direction = options.get("direction", "E")
+        if row.one_direction and isinstance(direction, list):
+            problems.add("joint.direction", f"one direction for {name}", direction)
+        if row.one_load and len(loads := loads_of(scene, row)) != 1:
+            *others, last = (key for key in LOADS if key in row.arguments())
+            expected = f"exactly one of {', '.join(others)} or {last} for {name} ({reason})"
+            problems.add(row.table, expected, Words(", ".join(loads)) or NONE)
 
 
 def _home_of(key: str) -> str:

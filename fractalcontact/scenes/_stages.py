@@ -1,8 +1,8 @@
 """The stages of a study as one static table: what each needs, its public function, its maps, its rows.
 
 The rows stand in an order in which they can run. `_plan` selects those that the wanted results of a scene
-need, `_options` gives the arguments of their calls, `_parts` carries them out, `_rows` has the tables of the
-results.
+need, `_options` gives the arguments of their calls, `_parts` carries them out. The tables of their results
+are in `_surface_rows`, `_joint_rows` and `_domain_rows`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from fractalcontact.scenes import _rows
+from fractalcontact.scenes import _domain_rows as of_domain
+from fractalcontact.scenes import _joint_rows as of_joint
+from fractalcontact.scenes import _surface_rows as of_surface
 from fractalcontact.scenes._functions import arguments_of, parameters_of
 from fractalcontact.scenes._result_tables import Rows
 from fractalcontact.scenes._scene import LOADS, PRESS, Scene
@@ -160,13 +162,23 @@ def _domain(name: str, rows: Rows | None = None, **more: Any) -> StageType:
 _ONE: dict[str, Any] = {"one_load": True, "one_direction": True}
 _ROWS = (
     StageType(
-        "surfaces", (), "surfaces.read", "surface", "surfaces.height", takes="file", rows=_rows.surfaces
+        "surfaces",
+        (),
+        "surfaces.read",
+        "surface",
+        "surfaces.height",
+        takes="file",
+        rows=of_surface.surfaces,
     ),  # with its description
     StageType("surfaces/description", _SURFACE, "surfaces.describe", wanted="surfaces.describe"),
     StageType(
-        "surfaces/texture", _SURFACE, "surfaces.texture", wanted="surfaces.texture", rows=_rows.texture
+        "surfaces/texture",
+        _SURFACE,
+        "surfaces.texture",
+        wanted="surfaces.texture",
+        rows=of_surface.texture,
     ),
-    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions", rows=_rows.dimensions),
+    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions", rows=of_surface.dimensions),
     _curve("spectrum"),
     _curve("variogram"),
     _curve("cube_counts"),
@@ -186,7 +198,7 @@ _ROWS = (
         splits=("step",),
         presses=True,
         one_load=True,
-        rows=_rows.contact,
+        rows=of_surface.contact,
     ),
     # not below contact: its steps are others than those of the load path
     StageType(
@@ -198,16 +210,16 @@ _ROWS = (
         keeps=SLIP_MAPS,
         presses=True,
         one_load=True,
-        rows=_rows.partial_slip,
+        rows=of_surface.partial_slip,
     ),
-    StageType("joints/faces", _SURFACE, "joints.register", "upper", takes="file", rows=_rows.faces),
+    StageType("joints/faces", _SURFACE, "joints.register", "upper", takes="file", rows=of_joint.faces),
     _joint("delta_surface", None, one_direction=True),
-    _joint("delta_dimension", _rows.delta_dimension, one_direction=True),
-    _joint("rigid_dilatancy", _rows.rigid_dilatancy, function="dilatancy", keys=("shear", "direction")),
-    _joint("closure", _rows.closure, keeps=CONTACT_MAPS, splits=("shear", "step"), presses=True, **_ONE),
+    _joint("delta_dimension", of_joint.delta_dimension, one_direction=True),
+    _joint("rigid_dilatancy", of_joint.rigid_dilatancy, function="dilatancy", keys=("shear", "direction")),
+    _joint("closure", of_joint.closure, keeps=CONTACT_MAPS, splits=("shear", "step"), presses=True, **_ONE),
     _joint(
         "closure_laws",
-        _rows.closure_laws,
+        of_joint.closure_laws,
         ("joints/closure",),
         takes="result",
         why="closure_laws needs it",
@@ -215,7 +227,7 @@ _ROWS = (
     ),
     _joint(
         "elimination",
-        _rows.elimination,
+        of_joint.elimination,
         function="closure",
         splits=("shear", "step"),
         presses=True,
@@ -225,11 +237,11 @@ _ROWS = (
         fixed={"method": "elimination"},
         **_ONE,
     ),
-    _joint("area_dimension", _rows.area_dimension, splits=("shear",), presses=True, **_ONE),
-    _joint(PARTIAL_SLIP, _rows.partial_slip, keeps=SLIP_MAPS, splits=("shear",), presses=True, **_ONE),
+    _joint("area_dimension", of_joint.area_dimension, splits=("shear",), presses=True, **_ONE),
+    _joint(PARTIAL_SLIP, of_surface.partial_slip, keeps=SLIP_MAPS, splits=("shear",), presses=True, **_ONE),
     _joint(
         "elastic_dilatancy",
-        _rows.elastic_dilatancy,
+        of_joint.elastic_dilatancy,
         (*_FACES, "joints/closure"),
         function="dilatancy",
         splits=("direction", "shear"),
@@ -238,37 +250,41 @@ _ROWS = (
     ),
     _joint(
         "friction",
-        _rows.friction,
+        of_joint.friction,
         ("joints/elastic_dilatancy or joints/rigid_dilatancy",),
         takes="result",
         why="friction needs a dilatancy",
         own=("nominal_pressure",),  # in [joint] it is the load of the closure
     ),
-    _of_surface("roughness_coefficient", _rows.roughness_coefficient),
-    _of_surface("directional_roughness", _rows.directional_roughness),
+    _of_surface("roughness_coefficient", of_joint.roughness_coefficient),
+    _of_surface("directional_roughness", of_joint.directional_roughness),
     _joint(
-        "direct_shear", _rows.direct_shear, splits=("nominal_pressure",), one_direction=True, presses=True
+        "direct_shear",
+        of_joint.direct_shear,
+        splits=("nominal_pressure",),
+        one_direction=True,
+        presses=True,
     ),
-    _of_surface("shear_curve", _rows.shear_curve, one_direction=True),
-    _of_surface("strength_envelope", _rows.strength_envelope, one_direction=True),
-    _joint("self_weight", _rows.self_weight, presses=True, may_be_rigid=True),
-    _joint("decorrelation_length", _rows.decorrelation_length, one_direction=True),
-    _of_gap("transmissivity", _rows.transmissivity),
-    _of_gap("uplift", _rows.uplift),
+    _of_surface("shear_curve", of_joint.shear_curve, one_direction=True),
+    _of_surface("strength_envelope", of_joint.strength_envelope, one_direction=True),
+    _joint("self_weight", of_joint.self_weight, presses=True, may_be_rigid=True),
+    _joint("decorrelation_length", of_joint.decorrelation_length, one_direction=True),
+    _of_gap("transmissivity", of_joint.transmissivity),
+    _of_gap("uplift", of_joint.uplift),
     # one window of lengths for all states
-    _domain("signature", _rows.signature, whole_path=True),
-    _domain("box_dimension", _rows.box_dimension, whole_path=True),
+    _domain("signature", of_domain.signature, whole_path=True),
+    _domain("box_dimension", of_domain.box_dimension, whole_path=True),
     _domain("box_counts"),
-    _domain("minkowski_dimension", _rows.minkowski_dimension),
-    _domain("correlation_dimension", _rows.correlation_dimension),
-    _domain("generalised_dimensions", _rows.generalised_dimensions),
-    _domain("boundary_dimension", _rows.boundary_dimension),
-    _domain("lacunarity", _rows.lacunarity),
-    _domain("islands", _rows.islands, keeps=(ISLAND_MAP,), whole_path=True),
-    _domain("percolation", _rows.percolation),
+    _domain("minkowski_dimension", of_domain.minkowski_dimension),
+    _domain("correlation_dimension", of_domain.correlation_dimension),
+    _domain("generalised_dimensions", of_domain.generalised_dimensions),
+    _domain("boundary_dimension", of_domain.boundary_dimension),
+    _domain("lacunarity", of_domain.lacunarity),
+    _domain("islands", of_domain.islands, keeps=(ISLAND_MAP,), whole_path=True),
+    _domain("percolation", of_domain.percolation),
     _domain("hausdorff_content"),
-    _domain("describe", _rows.describe, whole_path=True),
-    _domain("evolution", _rows.evolution, whole_path=True),
+    _domain("describe", of_domain.describe, whole_path=True),
+    _domain("evolution", of_domain.evolution, whole_path=True),
     _domain("lineage", whole_path=True),
     StageType(FIGURES, (), "plotting.draw", takes="study"),
 )
@@ -297,6 +313,9 @@ class Stage:
         Why the plan has it.
     keep : tuple of str
         Maps that it has to return.
+    internal, dropped : tuple of str
+        Those of them that the result file does not contain; and of these those that nothing needs once they
+        have been read plane by plane.
     stored : bool
         False where the result file does not contain it.
     whole_path : bool
@@ -307,6 +326,8 @@ class Stage:
     needs: tuple[str, ...]
     reason: str
     keep: tuple[str, ...] = ()
+    internal: tuple[str, ...] = ()
+    dropped: tuple[str, ...] = ()
     stored: bool = True
     whole_path: bool = False
 

@@ -23,7 +23,7 @@ from fractalcontact.scenes._checkpoint import PartStore, digest
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._inputs import plane_share, surface_grid
 from fractalcontact.scenes._parts import PartWithReaders, Precomputed, StageWork
-from fractalcontact.scenes._plan import stages_of, stored_maps
+from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stacked_results import stacked
 from fractalcontact.scenes._stages import FIGURES, STAGES, Stage
@@ -111,7 +111,7 @@ class Study:
         self.digests: dict[str, str] = {}
         self.works: dict[str, StageWork] = {}
         for stage in self.plan:
-            self.digests[stage.name] = digest(stage, scene, self.digests, self._dropped_maps(stage))
+            self.digests[stage.name] = digest(stage, scene, self.digests)
 
     def run(self, stop: signals.Stop) -> StudyResults:
         """Run all stages, or those before a stop was requested.
@@ -202,7 +202,9 @@ class Study:
 
     def _tasks(self, stage: Stage) -> dict[tuple[str, int], _PartTask]:
         """Return the missing parts of a stage, each with the stages that read its maps."""
-        work, readers, dropped = self.works[stage.name], self._part_readers(stage), self._dropped_maps(stage)
+        work = self.works[stage.name]
+        # the stages that read the maps of this one part by part, before the maps are dropped
+        readers = [other for other in self.plan if stage.name in other.needs and other.reads_part]
         functions = tuple(_parts.map_reader(reader, self.scene) for reader in readers)
         names = (stage.name, *(reader.name for reader in readers))
         for name in names:
@@ -216,26 +218,9 @@ class Study:
             if kept is not None and all(name in kept for name in stage.keep):
                 part = Precomputed(kept)
             keys = tuple(self._key(name, number) for name in kept_names)
-            task = _PartTask(PartWithReaders(part, functions, dropped), names, keys)
+            task = _PartTask(PartWithReaders(part, functions, stage.dropped), names, keys)
             tasks[stage.name, number] = task
         return tasks
-
-    def _part_readers(self, stage: Stage) -> list[Stage]:
-        """Return the stages that read the maps of this one part by part, before the maps are dropped."""
-        return [other for other in self.plan if stage.name in other.needs and other.reads_part]
-
-    def _dropped_maps(self, stage: Stage) -> tuple[str, ...]:
-        """Return the maps of a stage that nothing needs after the readers of each part."""
-        read = {
-            other.row.reads
-            for other in self.plan
-            if stage.name in other.needs and other.reads_map and not other.reads_part
-        }
-        return tuple(name for name in self._internal_maps(stage) if name not in read)
-
-    def _internal_maps(self, stage: Stage) -> tuple[str, ...]:
-        """Return the maps of a stage that are not stored."""
-        return tuple(name for name in stage.keep if name not in stored_maps(self.scene))
 
     def _key(self, name: str, number: int) -> str:
         return f"{name.replace('/', '.')}.{self.digests[name]}.{number:03d}"
@@ -243,7 +228,7 @@ class Study:
     def _groups(self) -> dict[str, xr.Dataset]:
         """Return the wanted results of the finished stages, without the maps that only other stages read."""
         return {
-            stage.name: _parts.without(self.results[stage.name], self._internal_maps(stage))
+            stage.name: _parts.without(self.results[stage.name], stage.internal)
             for stage in self.plan
             if stage.stored and stage.name in self.results
         }

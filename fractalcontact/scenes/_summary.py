@@ -13,9 +13,9 @@ from fractalcontact.base.study import group_of, member_count
 from fractalcontact.base.tables import Note, table
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._caveats import caveats
+from fractalcontact.scenes._joint_rows import aperture_as_placed
 from fractalcontact.scenes._overview import scan_facts, scan_tables
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
-from fractalcontact.scenes._rows import aperture_as_placed
 from fractalcontact.scenes._stages import STAGES
 
 LINES = 36  # of a summary on the screen; a command adds what it has written, 40 in all

@@ -1,128 +1,34 @@
-"""The table of every stage, as `_stages` names it: columns, and remarks for a reader of the whole table."""
+"""The tables of the stages of a joint, as `_stages` names them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import starmap
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.file_contents import remarks
 from fractalcontact.base.references import provenance_of
 from fractalcontact.base.study import MEMBER, group_of
-from fractalcontact.base.units import jrc_text, number, quantity_text
+from fractalcontact.base.units import jrc_text, number
 from fractalcontact.scenes._result_tables import (
     ROUNDING,
     Column,
-    Remarks,
-    Rows,
     amount,
+    at_value,
     finite,
     in_turn,
     length,
-    no_remarks,
     plain,
     rows,
 )
+from fractalcontact.scenes._surface_rows import AREAS
 
 WATER = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight of water over its viscosity, at 20 °C
 OUTSIDE_SCALE = (
     "A coefficient outside 0 to 20, the scale of the standard profiles, is extrapolated: it only says that "
     "the face is smoother, or rougher, than all of them."
 )
-# symbol of ISO 25178 and variable of `surfaces.describe` and `surfaces.texture`
-ISO_25178 = {
-    "Sq": "rms_height",
-    "Sa": "mean_absolute_height",
-    "Sp": "peak_height",
-    "Sv": "valley_depth",
-    "Sz": "peak_to_valley",
-    "Ssk": "skewness",
-    "Sku": "kurtosis",
-    "Sdq": "rms_slope",
-    "Sdr": "developed_area_excess",
-    "Sal": "autocorrelation_length",
-    "Str": "texture_aspect_ratio",
-    "Sk": "core_height",
-    "Spk": "reduced_peak_height",
-    "Svk": "reduced_valley_depth",
-}
-DIMENSIONLESS = ("skewness", "kurtosis", "rms_slope", "developed_area_excess", "texture_aspect_ratio")
-ON_SCREEN = ("Sq", "Sdq", "Sal", "Str")
-
-
-def _along(name: str, dim: str, value: Any) -> Any:
-    """Return a function that takes a variable at one value of a dim; None where there is none."""
-
-    def take(state: xr.Dataset) -> Any:
-        if name not in state or dim not in state.coords or value not in state[dim].values:
-            return None
-        return state[name].sel({dim: value})
-
-    return take
-
-
-def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield notes and reasons, those of several methods once."""
-    methods = [str(name) for name in data["method"].values]
-    for key in (key for key in ("note", "reason") if key in data):
-        texts = data[key].transpose(..., "method").values
-        yield from (f"{names}: {text}" for names, text in remarks(methods, texts).items())
-    if MEMBER in data.dims:
-        yield "The intervals are those of one surface: the means of their ends."
-
-
-def _misfit(state: xr.Dataset) -> str | None:
-    if "misfit" not in state:
-        return None
-    text = plain(np.abs(state["misfit"]), 1)
-    return "" if text == "-" else f"z = {text}"
-
-
-dimensions = rows(
-    "fractal dimension", ("method",),
-    Column("dimension D", "fractal_dimension", 3),
-    Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
-    Column("range of scales", ("scale_min", "scale_max")),
-    Column("goodness of fit", _misfit, screen=False),
-    remarks=_of_method,
-)  # fmt: skip
-
-
-def _iso_column(symbol: str, name: str) -> Column:
-    return Column(symbol, name, 3 if name in DIMENSIONLESS else None, screen=symbol in ON_SCREEN)
-
-
-def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield how a cloud of points became a surface: points, cells, and the plane below the heights."""
-    surface = group_of(tree, "surfaces")
-    statistics = data if surface is None else surface
-    record: Any = provenance_of(statistics)
-    while isinstance(record, dict) and "point_distance" not in record:  # what was done to the surface later
-        record = record.get("parameters", {}).get("surface", {})
-        record = record.get("provenance") if isinstance(record, dict) else None
-    if not isinstance(record, dict) or not {"y", "x"} <= set(statistics.sizes):
-        return
-    spacing = length(float(statistics["x"][1] - statistics["x"][0]))
-    cells = " x ".join(str(statistics.sizes[dim]) for dim in ("y", "x"))
-    distance = length(record["point_distance"])
-    text = f"gridded from {record['points']} points, about {distance} apart, on {cells} cells of {spacing}"
-    if record.get("plane") == "best fit":
-        tilt = float(np.degrees(np.arccos(min(1.0, abs(record["rotation_matrix"][2][2])))))
-        text += f"; heights are above the best-fit plane of the points, tilted by {tilt:.3g}°"
-    yield text
-
-
-surfaces = rows("ISO 25178", (), *starmap(_iso_column, ISO_25178.items()), remarks=_gridding)
-texture = rows("texture", (), *surfaces.columns)
-
-AREAS = (
-    Column("contact area", "contact_fraction"),
-    Column("area, perimeter-corrected", "corrected_contact_fraction", screen=False),
-)
-contact = rows("contact", ("step",), Column("closure", "closure"), *AREAS)
 
 
 def _outside_scale(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -236,29 +142,6 @@ area_dimension = rows(
 )  # fmt: skip
 
 
-def _sticks(state: xr.Dataset) -> str:
-    share = 100 * state["stick_area"] / state["contact_area"].where(state["contact_area"] > 0)
-    return f"{plain(share, 1)} %"
-
-
-def _slip_limits(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    limit = data["friction_coefficient"] * data["normal_force"].max()
-    yield f"all slides at {quantity_text(float(limit.mean()), 'N')}"
-    if "stuck_ratio" in data:
-        first = data["stiffness_ratio"].isel(step=0)
-        ratios = f"{plain(first, 3)} at the first step; {plain(data['stuck_ratio'], 3)} where nothing slips"
-        yield f"shear over normal stiffness of the joint: {ratios} (theory)"
-
-
-partial_slip = rows(
-    "partial slip", ("shear", "step"),
-    Column("displacement", "tangential_displacement"),
-    Column("sticks", _sticks),
-    Column("stiffness", "tangential_stiffness"),
-    Column("dissipated energy", "dissipated_energy"),
-    remarks=_slip_limits,
-    load="tangential_force",
-)  # fmt: skip
 delta_dimension = rows(
     "dimension of the delta-surface", ("shear",),
     Column("D of the delta-surface, by area", "covering_dimension", 3),
@@ -451,8 +334,8 @@ transmissivity = rows(
     "aperture", ("shear",),
     Column("normal force", "normal_force", screen=False),
     Column("mean aperture", "aperture"),
-    Column("hydraulic (x)", _along("hydraulic_aperture", "axis", "x")),
-    Column("hydraulic (y)", _along("hydraulic_aperture", "axis", "y"), screen=False),
+    Column("hydraulic (x)", at_value("hydraulic_aperture", "axis", "x")),
+    Column("hydraulic (y)", at_value("hydraulic_aperture", "axis", "y"), screen=False),
     remarks=_transmissivity,
 )  # fmt: skip
 
@@ -484,161 +367,9 @@ uplift = rows(
     "uplift", ("shear",),
     Column("effective stress", "effective_stress"),
     Column("normal stress", _normal_stress),
-    Column("uplift", _along("uplift_force", "diagram", "joint")),
-    Column("of the drained diagram", _along("uplift_force", "diagram", "drained"), screen=False),
-    Column("of the linear diagram", _along("uplift_force", "diagram", "linear"), screen=False),
-    Column("arm, joint", _along("uplift_arm", "diagram", "joint")),
+    Column("uplift", at_value("uplift_force", "diagram", "joint")),
+    Column("of the drained diagram", at_value("uplift_force", "diagram", "drained"), screen=False),
+    Column("of the linear diagram", at_value("uplift_force", "diagram", "linear"), screen=False),
+    Column("arm, joint", at_value("uplift_arm", "diagram", "joint")),
     remarks=_uplift_remarks,
 )  # fmt: skip
-
-
-def _set(title: str, *columns: Column, remarks: Remarks = no_remarks) -> Rows:
-    """Return the table of an analysis of contact sets: over the shears, or over the load."""
-    return rows(title, ("shear", "step"), *columns, remarks=remarks, first_dim=True)
-
-
-def _window(state: xr.Dataset) -> str | None:
-    """Return the lengths over which the dimension was fitted; those over others are not comparable."""
-    names = ("window_low", "window_high") if "window_low" in state else ("scale_min", "scale_max")
-    if not set(names) <= set(state.variables) or not finite(state[names[0]]).size:
-        return None
-    low, high = (finite(state[name]) for name in names)
-    if state[names[0]].attrs.get("units") == "m":
-        text = f"{length(low.min())} to {length(high.max())}"
-    else:
-        text = f"{low.min():g} to {high.max():g} cells"
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
-
-
-def _beside_random(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield how many sets have box counts that random sets of equal coverage do not have."""
-    if "differs_from_random" in data:
-        differs = np.asarray(data["differs_from_random"].values, dtype=bool)
-        yield (
-            "The counts of boxes of 2, 3 and 4 cells, not the dimensions, are tested against random sets of "
-            f"equal coverage: {int(differs.sum())} of {differs.size} sets differ."
-        )
-
-
-def _beside_null(name: str, null: str) -> Any:
-    """Return a function that writes a variable and, in brackets, that of random cells of equal coverage.
-
-    Over several box sizes both are those of the middle one.
-    """
-
-    def write(state: xr.Dataset) -> str | None:
-        if name not in state:
-            return None
-        state = state.isel(box_size=state.sizes.get("box_size", 0) // 2, missing_dims="ignore")
-        return plain(state[name], 2) + (f" ({plain(state[null], 2)})" if null in state else "")
-
-    return write
-
-
-def _set_dimension(name: str, words: str) -> Rows:
-    return _set(
-        words,
-        Column(f"{words} D (random)", _beside_null(name, "null_dimension")),
-        Column("over", _window),
-        Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
-        remarks=_beside_random,
-    )
-
-
-def _middle_box(state: xr.Dataset) -> str | None:
-    if "box_size" not in state.dims:
-        return None
-    if "box_length" in state:
-        return length(float(state["box_length"][state.sizes["box_size"] // 2]))
-    return f"{int(state['box_size'][state.sizes['box_size'] // 2])} cells"
-
-
-def _crosses(state: xr.Dataset) -> str | None:
-    """Return the axes along which the set of contacts crosses the body."""
-    if "percolates" not in state or "axis" not in state.coords:
-        return None
-    axes = [str(axis) for axis in state["axis"].values if bool(state["percolates"].sel(axis=axis).all())]
-    return f"along {' and '.join(axes)}" if axes else "no"
-
-
-islands = _set(
-    "islands",
-    Column("islands", "n_islands", 0),
-    Column("largest island", "largest_island"),
-    Column("mean area", "mean_island_area", screen=False),
-)
-box_dimension = _set_dimension("box_dimension", "box")
-minkowski_dimension = _set_dimension("minkowski_dimension", "Minkowski")
-correlation_dimension = _set_dimension("correlation_dimension", "correlation")
-boundary_dimension = _set_dimension("boundary_dimension", "boundary")
-generalised_dimensions = _set(
-    "generalised dimensions",
-    *(Column(f"D_{order}", _along("generalised_dimension", "moment_order", order), 2) for order in (0, 1, 2)),
-)
-lacunarity = _set(
-    "lacunarity",
-    Column("lacunarity (random)", _beside_null("lacunarity", "null_lacunarity")),
-    Column("boxes", _middle_box),
-)
-percolation = _set(
-    "percolation",
-    Column("contacts cross", _crosses),
-    Column("largest share", "largest_share"),
-)
-
-
-def _window_dimension(state: xr.Dataset) -> str | None:
-    """Return the dimension over the window and that of random spots, or why there is none."""
-    if "domain_dimension" not in state:
-        return None
-    if finite(state["domain_dimension"]).size:
-        return f"{plain(state['domain_dimension'], 2)} ({plain(state['spots_dimension'], 2)})"
-    flag = state["signature_flag"]
-    names = flag.attrs["flag_meanings"].split()
-    words = [names[value].replace("_", " ") for value in np.unique(flag.values)]
-    return ", ".join(words)
-
-
-def _longest_scale(name: str) -> Any:
-    """Return a function that takes a variable at the longest of the three scales of the window."""
-    return lambda state: state[name].isel(scale=-1) if name in state else None
-
-
-def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield the windows (each member has its own), and why some states have no dimension."""
-    ends = zip(*(data[name].values.ravel() for name in ("window_low", "window_high")), strict=True)
-    for low, high in dict.fromkeys((length(low), length(high)) for low, high in ends if np.isfinite(low)):
-        yield f"D is over {low} to {high}, beside that of random spots; clustering and patches at {high}."
-    reasons = sorted({str(reason) for reason in data["reason"].values.ravel() if reason})
-    if reasons:
-        count = int((data["signature_flag"] > 0).sum())
-        yield f"{count} of {data['signature_flag'].size} states have no dimension, as {reasons[0]}."
-
-
-signature = _set(
-    "signature of the contact set",
-    Column("spot", "spot_size"),
-    Column("gap", "gap_size"),
-    Column("D (random spots)", _window_dimension),
-    Column("clustering", _longest_scale("clustering"), 2),
-    Column("patch", _longest_scale("integral_range")),
-    Column("lacunarity x : y", _longest_scale("lacunarity_ratio"), 2, screen=False),
-    remarks=_signature_window,
-)
-describe = _set(
-    "contact set",
-    Column("islands", "n_islands", 0),
-    Column("box D (random)", _beside_null("box_dimension", "null_dimension")),
-    Column("D over the window", _window_dimension),
-    Column("clustering", _longest_scale("clustering"), 2),
-    Column("contacts cross", _crosses, screen=False),
-)
-evolution = _set(
-    "evolution",
-    Column("births", "births", 0),
-    Column("deaths", "deaths", 0),
-    Column("merges", "merges", 0),
-    Column("splits", "splits", 0),
-    Column("D (random spots)", _window_dimension, screen=False),
-    remarks=_signature_window,
-)

@@ -1,0 +1,176 @@
+"""The tables of the stages that analyse the set of true contacts, as `_stages` names them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.scenes._result_tables import (
+    Column,
+    Remarks,
+    Rows,
+    at_value,
+    finite,
+    length,
+    no_remarks,
+    plain,
+    rows,
+)
+
+
+def _set(title: str, *columns: Column, remarks: Remarks = no_remarks) -> Rows:
+    """Return the table of an analysis of contact sets: over the shears, or over the load."""
+    return rows(title, ("shear", "step"), *columns, remarks=remarks, first_dim=True)
+
+
+def _window(state: xr.Dataset) -> str | None:
+    """Return the lengths over which the dimension was fitted; those over others are not comparable."""
+    names = ("window_low", "window_high") if "window_low" in state else ("scale_min", "scale_max")
+    if not set(names) <= set(state.variables) or not finite(state[names[0]]).size:
+        return None
+    low, high = (finite(state[name]) for name in names)
+    if state[names[0]].attrs.get("units") == "m":
+        text = f"{length(low.min())} to {length(high.max())}"
+    else:
+        text = f"{low.min():g} to {high.max():g} cells"
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def _beside_random(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield how many sets have box counts that random sets of equal coverage do not have."""
+    if "differs_from_random" in data:
+        differs = np.asarray(data["differs_from_random"].values, dtype=bool)
+        yield (
+            "The counts of boxes of 2, 3 and 4 cells, not the dimensions, are tested against random sets of "
+            f"equal coverage: {int(differs.sum())} of {differs.size} sets differ."
+        )
+
+
+def _beside_null(name: str, null: str) -> Any:
+    """Return a function that writes a variable and, in brackets, that of random cells of equal coverage.
+
+    Over several box sizes both are those of the middle one.
+    """
+
+    def write(state: xr.Dataset) -> str | None:
+        if name not in state:
+            return None
+        state = state.isel(box_size=state.sizes.get("box_size", 0) // 2, missing_dims="ignore")
+        return plain(state[name], 2) + (f" ({plain(state[null], 2)})" if null in state else "")
+
+    return write
+
+
+def _set_dimension(name: str, words: str) -> Rows:
+    return _set(
+        words,
+        Column(f"{words} D (random)", _beside_null(name, "null_dimension")),
+        Column("over", _window),
+        Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
+        remarks=_beside_random,
+    )
+
+
+def _middle_box(state: xr.Dataset) -> str | None:
+    if "box_size" not in state.dims:
+        return None
+    if "box_length" in state:
+        return length(float(state["box_length"][state.sizes["box_size"] // 2]))
+    return f"{int(state['box_size'][state.sizes['box_size'] // 2])} cells"
+
+
+def _crosses(state: xr.Dataset) -> str | None:
+    """Return the axes along which the set of contacts crosses the body."""
+    if "percolates" not in state or "axis" not in state.coords:
+        return None
+    axes = [str(axis) for axis in state["axis"].values if bool(state["percolates"].sel(axis=axis).all())]
+    return f"along {' and '.join(axes)}" if axes else "no"
+
+
+islands = _set(
+    "islands",
+    Column("islands", "n_islands", 0),
+    Column("largest island", "largest_island"),
+    Column("mean area", "mean_island_area", screen=False),
+)
+box_dimension = _set_dimension("box_dimension", "box")
+minkowski_dimension = _set_dimension("minkowski_dimension", "Minkowski")
+correlation_dimension = _set_dimension("correlation_dimension", "correlation")
+boundary_dimension = _set_dimension("boundary_dimension", "boundary")
+generalised_dimensions = _set(
+    "generalised dimensions",
+    *(
+        Column(f"D_{order}", at_value("generalised_dimension", "moment_order", order), 2)
+        for order in (0, 1, 2)
+    ),
+)
+lacunarity = _set(
+    "lacunarity",
+    Column("lacunarity (random)", _beside_null("lacunarity", "null_lacunarity")),
+    Column("boxes", _middle_box),
+)
+percolation = _set(
+    "percolation",
+    Column("contacts cross", _crosses),
+    Column("largest share", "largest_share"),
+)
+
+
+def _window_dimension(state: xr.Dataset) -> str | None:
+    """Return the dimension over the window and that of random spots, or why there is none."""
+    if "domain_dimension" not in state:
+        return None
+    if finite(state["domain_dimension"]).size:
+        return f"{plain(state['domain_dimension'], 2)} ({plain(state['spots_dimension'], 2)})"
+    flag = state["signature_flag"]
+    names = flag.attrs["flag_meanings"].split()
+    words = [names[value].replace("_", " ") for value in np.unique(flag.values)]
+    return ", ".join(words)
+
+
+def _longest_scale(name: str) -> Any:
+    """Return a function that takes a variable at the longest of the three scales of the window."""
+    return lambda state: state[name].isel(scale=-1) if name in state else None
+
+
+def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield the windows (each member has its own), and why some states have no dimension."""
+    ends = zip(*(data[name].values.ravel() for name in ("window_low", "window_high")), strict=True)
+    for low, high in dict.fromkeys((length(low), length(high)) for low, high in ends if np.isfinite(low)):
+        yield f"D is over {low} to {high}, beside that of random spots; clustering and patches at {high}."
+    reasons = sorted({str(reason) for reason in data["reason"].values.ravel() if reason})
+    if reasons:
+        count = int((data["signature_flag"] > 0).sum())
+        yield f"{count} of {data['signature_flag'].size} states have no dimension, as {reasons[0]}."
+
+
+signature = _set(
+    "signature of the contact set",
+    Column("spot", "spot_size"),
+    Column("gap", "gap_size"),
+    Column("D (random spots)", _window_dimension),
+    Column("clustering", _longest_scale("clustering"), 2),
+    Column("patch", _longest_scale("integral_range")),
+    Column("lacunarity x : y", _longest_scale("lacunarity_ratio"), 2, screen=False),
+    remarks=_signature_window,
+)
+describe = _set(
+    "contact set",
+    Column("islands", "n_islands", 0),
+    Column("box D (random)", _beside_null("box_dimension", "null_dimension")),
+    Column("D over the window", _window_dimension),
+    Column("clustering", _longest_scale("clustering"), 2),
+    Column("contacts cross", _crosses, screen=False),
+)
+evolution = _set(
+    "evolution",
+    Column("births", "births", 0),
+    Column("deaths", "deaths", 0),
+    Column("merges", "merges", 0),
+    Column("splits", "splits", 0),
+    Column("D (random spots)", _window_dimension, screen=False),
+    remarks=_signature_window,
+)

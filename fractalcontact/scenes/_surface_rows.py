@@ -1,0 +1,127 @@
+"""The tables of the stages of a surface: height, roughness, dimension, contact with a flat, partial slip."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import starmap
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.file_contents import remarks
+from fractalcontact.base.references import provenance_of
+from fractalcontact.base.study import MEMBER, group_of
+from fractalcontact.base.units import quantity_text
+from fractalcontact.scenes._result_tables import (
+    Column,
+    length,
+    plain,
+    rows,
+)
+
+# symbol of ISO 25178 and variable of `surfaces.describe` and `surfaces.texture`
+ISO_25178 = {
+    "Sq": "rms_height",
+    "Sa": "mean_absolute_height",
+    "Sp": "peak_height",
+    "Sv": "valley_depth",
+    "Sz": "peak_to_valley",
+    "Ssk": "skewness",
+    "Sku": "kurtosis",
+    "Sdq": "rms_slope",
+    "Sdr": "developed_area_excess",
+    "Sal": "autocorrelation_length",
+    "Str": "texture_aspect_ratio",
+    "Sk": "core_height",
+    "Spk": "reduced_peak_height",
+    "Svk": "reduced_valley_depth",
+}
+DIMENSIONLESS = ("skewness", "kurtosis", "rms_slope", "developed_area_excess", "texture_aspect_ratio")
+ON_SCREEN = ("Sq", "Sdq", "Sal", "Str")
+
+
+def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield notes and reasons, those of several methods once."""
+    methods = [str(name) for name in data["method"].values]
+    for key in (key for key in ("note", "reason") if key in data):
+        texts = data[key].transpose(..., "method").values
+        yield from (f"{names}: {text}" for names, text in remarks(methods, texts).items())
+    if MEMBER in data.dims:
+        yield "The intervals are those of one surface: the means of their ends."
+
+
+def _misfit(state: xr.Dataset) -> str | None:
+    if "misfit" not in state:
+        return None
+    text = plain(np.abs(state["misfit"]), 1)
+    return "" if text == "-" else f"z = {text}"
+
+
+dimensions = rows(
+    "fractal dimension", ("method",),
+    Column("dimension D", "fractal_dimension", 3),
+    Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
+    Column("range of scales", ("scale_min", "scale_max")),
+    Column("goodness of fit", _misfit, screen=False),
+    remarks=_of_method,
+)  # fmt: skip
+
+
+def _iso_column(symbol: str, name: str) -> Column:
+    return Column(symbol, name, 3 if name in DIMENSIONLESS else None, screen=symbol in ON_SCREEN)
+
+
+def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield how a cloud of points became a surface: points, cells, and the plane below the heights."""
+    surface = group_of(tree, "surfaces")
+    statistics = data if surface is None else surface
+    record: Any = provenance_of(statistics)
+    while isinstance(record, dict) and "point_distance" not in record:  # what was done to the surface later
+        record = record.get("parameters", {}).get("surface", {})
+        record = record.get("provenance") if isinstance(record, dict) else None
+    if not isinstance(record, dict) or not {"y", "x"} <= set(statistics.sizes):
+        return
+    spacing = length(float(statistics["x"][1] - statistics["x"][0]))
+    cells = " x ".join(str(statistics.sizes[dim]) for dim in ("y", "x"))
+    distance = length(record["point_distance"])
+    text = f"gridded from {record['points']} points, about {distance} apart, on {cells} cells of {spacing}"
+    if record.get("plane") == "best fit":
+        tilt = float(np.degrees(np.arccos(min(1.0, abs(record["rotation_matrix"][2][2])))))
+        text += f"; heights are above the best-fit plane of the points, tilted by {tilt:.3g}°"
+    yield text
+
+
+surfaces = rows("ISO 25178", (), *starmap(_iso_column, ISO_25178.items()), remarks=_gridding)
+texture = rows("texture", (), *surfaces.columns)
+
+AREAS = (
+    Column("contact area", "contact_fraction"),
+    Column("area, perimeter-corrected", "corrected_contact_fraction", screen=False),
+)
+contact = rows("contact", ("step",), Column("closure", "closure"), *AREAS)
+
+
+def _sticks(state: xr.Dataset) -> str:
+    share = 100 * state["stick_area"] / state["contact_area"].where(state["contact_area"] > 0)
+    return f"{plain(share, 1)} %"
+
+
+def _slip_limits(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    limit = data["friction_coefficient"] * data["normal_force"].max()
+    yield f"all slides at {quantity_text(float(limit.mean()), 'N')}"
+    if "stuck_ratio" in data:
+        first = data["stiffness_ratio"].isel(step=0)
+        ratios = f"{plain(first, 3)} at the first step; {plain(data['stuck_ratio'], 3)} where nothing slips"
+        yield f"shear over normal stiffness of the joint: {ratios} (theory)"
+
+
+partial_slip = rows(
+    "partial slip", ("shear", "step"),
+    Column("displacement", "tangential_displacement"),
+    Column("sticks", _sticks),
+    Column("stiffness", "tangential_stiffness"),
+    Column("dissipated energy", "dissipated_energy"),
+    remarks=_slip_limits,
+    load="tangential_force",
+)  # fmt: skip
