@@ -9,19 +9,19 @@ import time
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from fractalcontact.base import netcdf, provenance, schema, signals
+from fractalcontact.base import netcdf, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
 from fractalcontact.base.process import calls_in_two_processes
-from fractalcontact.base.references import joined_references, provenance_of
+from fractalcontact.base.references import provenance_of
 from fractalcontact.base.study import of_member
 from fractalcontact.base.threads import DRAWING_LOCK, most_workers
 from fractalcontact.base.validation import Problems
@@ -30,20 +30,20 @@ from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._html_report import page_contents, write_report
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, main_results, pictured, pooled
+from fractalcontact.scenes._inputs import read_surface
+from fractalcontact.scenes._overview import OVERVIEW, SCANS, pictured, pooled
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_result, warn
+from fractalcontact.scenes._result_tree import note_run_time, result_tree
 from fractalcontact.scenes._scan_files import scans_of
-from fractalcontact.scenes._scans import PARTIAL, ScanStudies
+from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stage_memory import check_memory
 from fractalcontact.scenes._stages import FIGURES
-from fractalcontact.scenes._study import Study, study_ensemble
+from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._tables import tables
 from fractalcontact.scenes._validation import validated
-
-OWN_REFERENCES = "see the references of each group"
 
 
 def run(
@@ -160,8 +160,8 @@ def _run_scans(
                 done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
                 raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
             groups = studies.groups()
-            tree = _assemble(scene, groups, studies.seconds, [], pooled(groups[OVERVIEW]))
-            _note_run_time(tree, start)
+            tree = result_tree(scene, StudyResults(groups, studies.seconds), pooled(groups[OVERVIEW]))
+            note_run_time(tree, start)
             tree.attrs["caveats"] = "none"
             together.add(tree)
         with _beside_the_result():
@@ -189,10 +189,11 @@ def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[s
     start = time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the report of the scan has them
-        check_memory(scene, stages_of(scene))
+        face = read_surface(scene.surface, scene.folder)
+        check_memory(scene, stages_of(scene), face=face)
         folder.mkdir(exist_ok=True)
         with locked(folder):
-            return _run(scene, folder, False, None, start, stop, facts)[0]
+            return _run(scene, folder, False, None, start, stop, facts, {"surface": face})[0]
 
 
 def _run(
@@ -215,26 +216,20 @@ def _run(
         study = Study(scene, store, progress, workers, goes_on=bool(facts), faces=faces).run(stop)
     else:
         study = study_ensemble(scene, store, progress, workers, stop)
-    missing = study.missing + ([FIGURES] if stop and scene.want.figures else [])
-    groups = study.groups
+    if stop and scene.want.figures:
+        study = replace(study, missing=[*study.missing, FIGURES])
+    if study.failures and not study.groups:
+        raise InvalidInput("fractalcontact.scenes.run", study.reasons)
     for name in ("contact", "joints/closure"):
-        if name in groups:
-            warn(implausible_result(name, groups[name]))
-    tree = _assemble(scene, groups, study.seconds, missing)
-    tree.attrs |= study.preparation
-    reasons = list(dict.fromkeys(study.failures.values()))
-    failed = [", ".join(stage for stage in study.failures if study.failures[stage] == why) for why in reasons]
-    lines = [f"{stages}: {why}" for stages, why in zip(failed, reasons, strict=True)]
-    if failed and not groups:
-        raise InvalidInput("fractalcontact.scenes.run", lines)
-    if not failed:
+        if name in study.groups:
+            warn(implausible_result(name, study.groups[name]))
+    tree = result_tree(scene, study)
+    if not study.failures:
         tree.attrs.update(facts)
-    elif not missing:
-        tree.attrs["completeness"] = PARTIAL + "; ".join(lines)
-    _note_run_time(tree, start)
+    note_run_time(tree, start)
     if folder is None:
         return tree, None
-    if missing:
+    if study.missing:
         netcdf.save(tree, folder / PARTIAL_RESULT)
         raise signals.Stopped(
             stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
@@ -249,17 +244,17 @@ def _run(
             calls = partial(_draw, tree, folder, progress), partial(page_contents, tree)
             results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
             figures, contents = results[0], results[1]
-            _note_run_time(tree, start)
+            note_run_time(tree, start)
             _results_folder.remove_old_figures(folder, figures)
         whole = summary_of(tree)
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         netcdf.replace_attributes(folder / RESULT, changed)
         write_report(tree, folder / _results_folder.REPORT, figures, whole, contents)
-        if scene.want.datasheet and not failed:
+        if scene.want.datasheet and not study.failures:
             tables(tree, folder / _results_folder.TABLES)
             _draw_datasheet(tree, folder / _results_folder.DATASHEET)
-    if not failed:
+    if not study.failures:
         store.clear()
     return tree, whole
 
@@ -279,101 +274,6 @@ def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) ->
         if problems.integer("workers", workers, at_least=0, at_most=most_workers()) and workers:
             problems.require(client is None, "workers / client", "one of them", "both of them")
         workers_of(client)
-
-
-def _assemble(
-    scene: Scene,
-    results: Mapping[str, xr.Dataset],
-    seconds: Mapping[str, float],
-    missing: list[str],
-    main: xr.Dataset | None = None,
-) -> xr.DataTree:
-    """Return the finished results as a tree that states what is missing; in its root the `main` ones."""
-    groups = {"/": main_results(results) if main is None else main} | {
-        f"/{name}": result for name, result in results.items()
-    }
-    description = groups.pop("/surfaces/description", None)
-    if description is not None:
-        heights = groups.get("/surfaces", xr.Dataset())
-        groups["/surfaces"] = _merged(heights, description) if heights else description
-    tree = xr.DataTree.from_dict(
-        {path: schema.encoded(dataset) for path, dataset in groups.items()}, name=scene.name
-    )
-    root = xr.Dataset()
-    provenance.stamp(
-        root,
-        "fractalcontact.scenes.run",
-        {"scene": _without_folders(scene.tables)},
-        title=str(scene.tables.get("title", scene.name)),
-        references=OWN_REFERENCES,
-        stages={
-            name: {
-                "run_time": second,
-                "origin": "computed" if second else "kept from an earlier run",
-                **(_achieved(results[name]) if name in results else {}),
-            }
-            for name, second in seconds.items()
-        },
-    )
-    named = ", ".join(node.path.strip("/") for node in tree.subtree if node is not tree and node.has_data)
-    tree.attrs = root.attrs | {"comment": f"{root.attrs['comment']}; results by group: {named}"}
-    if missing:
-        tree.attrs["completeness"] = f"{PARTIAL}the run was stopped; missing: {', '.join(missing)}"
-    return tree
-
-
-def _without_folders(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of a scene; of a file outside its folder the name alone."""
-    plain = dict(tables)
-    for name in ("surface", "upper"):
-        read = plain.get(name, {}).get("read")
-        if isinstance(read, list):
-            plain[name] = {**plain[name], "read": [_name_outside(each) for each in read]}
-        elif read is not None:
-            plain[name] = {**plain[name], "read": _name_outside(read)}
-    return plain
-
-
-def _name_outside(read: Any) -> Any:
-    """Return the name alone of a file with an absolute path."""
-    is_outside = isinstance(read, str) and (Path(read).is_absolute() or read.startswith("~"))
-    return Path(read).name if is_outside else read
-
-
-def _merged(heights: xr.Dataset, description: xr.Dataset) -> xr.Dataset:
-    """Return the heights of a surface with its description; the provenance states both calls."""
-    merged = heights.assign(description.data_vars)
-    entry = provenance_of(heights) | {"merged": [provenance_of(description)]}
-    sources = (dataset.attrs["references"] for dataset in (heights, description))
-    references = joined_references(*sources)
-    return merged.assign_attrs(provenance=json.dumps(entry), references=references)
-
-
-def _note_run_time(tree: xr.DataTree, start: float) -> None:
-    """Note the time since the call of `run`: stages, validation, starting of workers, waiting."""
-    entry = provenance_of(tree)
-    tree.attrs["provenance"] = json.dumps(entry | {"run_time": time.perf_counter() - start})
-
-
-def _achieved(result: xr.Dataset) -> dict[str, Any]:
-    """Return the accuracy that a result reports: numbers, or words where it has none."""
-    facts: dict[str, Any] = {}
-    if "residual" in result:
-        facts["residual"] = float(result["residual"].max())
-    if "converged" in result:
-        facts["converged"] = bool(result["converged"].all())
-    if "iterations" in result:
-        facts["iterations"] = int(result["iterations"].sum())
-    if "standard_error" in result:
-        by_method = np.atleast_1d(result["standard_error"].values)
-        by_method = by_method.reshape(-1, by_method.shape[-1]).T  # the members of an ensemble come first
-        known = [errors[np.isfinite(errors)] for errors in by_method]
-        ends = [dict.fromkeys(f"{end:.4f}" for end in (e.min(), e.max())) for e in known if e.size]
-        facts["standard error of H"] = " ".join(" to ".join(pair) for pair in ends) or "none"
-    if "interpolation_error" in result and np.isfinite(result["interpolation_error"]).all():
-        facts["interpolation error (m)"] = float(result["interpolation_error"].max())
-    words = provenance_of(result).get("achieved_error")
-    return facts if facts or words is None else {"error": words}
 
 
 def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:

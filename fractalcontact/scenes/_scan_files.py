@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.file_patterns import files_of, is_pattern
-from fractalcontact.base.validation import Problems, Words
+from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._overview import folder_of
 from fractalcontact.scenes._scene import Scene
 
@@ -35,6 +35,8 @@ def scans_of(scene: Scene) -> dict[str, Scene]:
         return {}
     reads = {name: scene.table(name)["read"] for name in ("surface", "upper") if "read" in scene.table(name)}
     with Problems(f"scene {scene.name}") as problems:
+        problems.require("surface" in reads, "surface.read", "a lower face for every upper one", NONE)
+    with problems:
         files = {name: _files(read, name, scene.folder, problems) for name, read in reads.items()}
         if len(files) == 2 and all(files.values()):
             _check_pairs(reads, files, problems)

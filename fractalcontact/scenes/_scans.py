@@ -26,6 +26,7 @@ from fractalcontact.scenes._checkpoint import PartStore, digest_of
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, folder_of
 from fractalcontact.scenes._result_tables import SCAN
+from fractalcontact.scenes._result_tree import PARTIAL
 from fractalcontact.scenes._results_folder import REPORT
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stacked_results import stacked
@@ -34,8 +35,6 @@ from fractalcontact.scenes._tables import MAP_DIMS
 
 DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
 NO_ACCESS = "the worker does not see the folder of the results"
-
-PARTIAL = "partial: "  # start of the attribute `completeness`
 StudyOne = Callable[[Scene, Path, signals.Stop, Mapping[str, str]], xr.DataTree]
 Numbers = dict[str, xr.Dataset]
 

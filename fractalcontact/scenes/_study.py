@@ -74,6 +74,14 @@ class StudyResults:
     failures: dict[str, str] = field(default_factory=dict)
     preparation: dict[str, str | float] = field(default_factory=dict)
 
+    @property
+    def reasons(self) -> list[str]:
+        """Every reason once, with the stages that failed for it."""
+        stages: dict[str, list[str]] = {}
+        for stage, reason in self.failures.items():
+            stages.setdefault(reason, []).append(stage)
+        return [f"{', '.join(names)}: {reason}" for reason, names in stages.items()]
+
 
 class Study:
     """One run of a scene with one surface: the results so far and the time they took.

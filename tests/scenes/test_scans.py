@@ -264,6 +264,14 @@ def test_pairs_are_matched_by_name_and_mismatches_listed(tmp_path):
         fc.scenes.validate(scene)
 
 
+def test_upper_faces_need_lower_ones(tmp_path):
+    scene = write_scans(tmp_path)
+    made = 'generate = "fbm"\nshape = [32, 32]\nspacing = 1e-4\nhurst = 0.7\nrms_increment = 1e-5'
+    scene.write_text(SCENE.replace('read = "scans/*.nc"', made) + '[upper]\nread = "scans/*.nc"\n')
+    with pytest.raises(InvalidInput, match=r"surface.read: expected a lower face for every upper one"):
+        fc.scenes.validate(scene)
+
+
 def test_a_scene_that_fits_no_scan_is_refused(tmp_path):
     write_scans(tmp_path, {"a.nc": (32, 1e-4), "b.nc": (32, 1e-4)})
     scene = tmp_path / "joint.toml"
