@@ -8,8 +8,8 @@ from scipy.special import zeta
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import aliased_power_law, half_weights, radial_wavenumber
 
-BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane
-BOUND_STEP = 1e-4  # of the derivative by H
+BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane: 1024 change a bound by up to 1.3 %
+BOUND_STEP = 1e-4  # of the derivative by H: 1e-5 and 1e-3 change a bound by 5e-6 and 2e-4 of it
 
 
 def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, aliases: bool = True) -> float:

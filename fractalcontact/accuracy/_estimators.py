@@ -39,11 +39,11 @@ FAMILIES = {
     "spectral": f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
 }
 ROLLOFF = 8.0  # edge over the wavelength of the corner of the roll-off
-SPACING, HEIGHT = 1e-4, 1e-6  # m
-BATCH = 1 << 22  # points generated at a time
+SPACING, HEIGHT = 1e-4, 1e-6  # m: no result depends on them
+BATCH = 1 << 22  # points generated at a time: heights of 32 MB
 MARK, MARK_ANGLE = 7.0, 0.5  # wavelength in spacings and azimuth, radian, of an oblique wave
-MEMBER_POINTS = 25600  # members times points along an edge, unless members are given
-LEVEL = 0.95
+MEMBER_POINTS = 25600  # members times points along an edge: coverage to within 1, 2, 4 % at 64, 256, 1024
+LEVEL = 0.95  # of the intervals of `dimensions.estimate`, and of those of this table
 
 DIMS = ("method", "family", "hurst", "size")
 SAME = (*DIMS, "member_count", "blur", "noise", "marks")

@@ -39,7 +39,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.scenes.report"
 SURFACE_CELLS = 128  # along the longer side of the surface that can be turned: 44 kB in the page
-MAP_CELLS = 400  # along the longer side of a map
+MAP_CELLS = 400  # along the longer side of a map, which the page shows 512 pixels wide
 MAPS = 120  # pictures of one set of maps: at 2 bits for each cell no more than 7 MB in the page
 ROWS = 100  # of a table on the page; the CSV file has all
 RELIEF = 0.25  # height range of the drawn surface over its longer side
