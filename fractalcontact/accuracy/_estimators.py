@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,17 +29,12 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import label
 from fractalcontact.base.validation import NONE, Problems, word_tuple
 
+Stream = np.random.Generator
+
 WHERE = "fractalcontact.accuracy.estimators"
 TITLE = "Estimators of the Hurst exponent on surfaces of known exponent"
 REFERENCES = "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63"
 SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
-FAMILIES = {
-    "fbm": "exact fractional Brownian surface",
-    "crop": "free part of a periodic surface of twice the edge, power law down to the spacing, no aliases",
-    "matern": "exact surface of the Matern covariance, a slow roll-off from an eighth of the edge on",
-    "profile": "exact fractional Brownian profile",
-    "spectral": f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
-}
 ROLLOFF = 8.0  # edge over the wavelength of the corner of the roll-off
 SPACING, HEIGHT = 1e-4, 1e-6  # m: no result depends on them
 BATCH = 1 << 22  # points generated at a time: heights of 32 MB
@@ -168,8 +165,9 @@ def estimators(
             continue
         k, h, n = place
         truth, size = float(exponents[h]), edges[n]
-        bound = _bound(kinds[k], truth, size, defects["blur"])
-        samples = _sample(kinds[k], truth, size, counts[n], names, defects, stream)
+        family = FAMILIES[kinds[k]]
+        bound = family.bound(truth, size, defects["blur"])
+        samples = _sample(family, truth, size, counts[n], names, defects, stream)
         table["least_error"].values[place] = bound
         for row, sample in enumerate(np.moveaxis(samples, -1, 0)):
             for name, value in _scores(truth, bound, *sample).items():
@@ -186,42 +184,90 @@ def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[i
     return counts if len(counts) == len(sizes) else counts[:1] * len(sizes)
 
 
-def _bound(family: str, hurst: float, n: int, blur: float = 0.0) -> float:
-    if family == "fbm":
-        return brownian_bound(hurst, n, blur)
-    if family == "crop":
-        return brownian_bound(hurst, n, blur, aliases=False)
-    if family == "matern":
-        return rolloff_bound(hurst, n, n / ROLLOFF, blur)
-    if family == "profile":
-        return brownian_bound(hurst, n, blur, axes=1)
-    return band_bound((n, n), SHORTEST, float(n))
+def _brownian(axes: int, hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
+    shape = (n + 2 * margin,) * axes
+    return surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=HEIGHT, members=count, rng=stream)
+
+
+def _crop(hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
+    wide = n + 2 * margin
+    options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
+    periodic = surfaces.spectral((2 * n + 2 * margin,) * 2, SPACING, rms_height=HEIGHT, **options)
+    steps = np.diff(periodic.values, axis=-1)
+    result = (periodic * (HEIGHT / np.sqrt(np.mean(steps**2)))).isel(y=slice(wide), x=slice(wide))
+    return surfaces.from_array(result.values, SPACING)
+
+
+def _rolled_off(hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
+    wide = (n + 2 * margin,) * 2
+    return surfaces.from_array(HEIGHT * matern(wide, hurst, n / ROLLOFF, count, stream), SPACING)
+
+
+def _band(hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
+    del margin  # it is periodic
+    cutoff = SHORTEST * SPACING
+    return surfaces.spectral(
+        (n, n), SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, hurst=hurst, members=count, rng=stream
+    )
+
+
+@dataclass(frozen=True)
+class Family:
+    """Surfaces of known exponent.
+
+    Attributes
+    ----------
+    words : str
+    make : function
+        Of the exponent, points along an edge, points of a margin around them, the number of surfaces, and the
+        random stream.
+    bound : function
+        The Cramer-Rao bound, of the exponent, points along an edge, and the spread of a blur in spacings.
+    is_free : bool
+        Not periodic: they can be blurred beyond their edges, and get noise and marks.
+    """
+
+    words: str
+    make: Callable[[float, int, int, int, Stream], xr.DataArray]
+    bound: Callable[[float, int, float], float]
+    is_free: bool = True
+
+
+FAMILIES = {
+    "fbm": Family("exact fractional Brownian surface", partial(_brownian, 2), brownian_bound),
+    "crop": Family(
+        "free part of a periodic surface of twice the edge, power law down to the spacing, no aliases",
+        _crop,
+        partial(brownian_bound, aliases=False),
+    ),
+    "matern": Family(
+        "exact surface of the Matern covariance, a slow roll-off from an eighth of the edge on",
+        _rolled_off,
+        lambda hurst, n, blur: rolloff_bound(hurst, n, n / ROLLOFF, blur),
+    ),
+    "profile": Family(
+        "exact fractional Brownian profile", partial(_brownian, 1), partial(brownian_bound, axes=1)
+    ),
+    "spectral": Family(
+        f"periodic surface, power law from the extent down to {SHORTEST:g} spacings",
+        _band,
+        lambda _, n, __: band_bound((n, n), SHORTEST, float(n)),
+        is_free=False,
+    ),
+}
 
 
 def _surfaces(
-    family: str, hurst: float, n: int, count: int, defects: dict[str, float], stream: np.random.Generator
+    family: Family, hurst: float, n: int, count: int, defects: dict[str, float], stream: Stream
 ) -> xr.DataArray:
-    options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
-    if family == "spectral":
-        cutoff = SHORTEST * SPACING
-        return surfaces.spectral((n, n), SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, **options)
+    """Return surfaces of a family; free ones are made with a margin, blurred, and get noise and marks."""
+    if not family.is_free:
+        return family.make(hurst, n, 0, count, stream)
     margin = int(np.ceil(5.0 * defects["blur"]))
-    wide = (n + 2 * margin,) * (1 if family == "profile" else 2)
-    if family == "crop":
-        periodic = surfaces.spectral((2 * n + 2 * margin,) * 2, SPACING, rms_height=HEIGHT, **options)
-        steps = np.diff(periodic.values, axis=-1)
-        result = (periodic * (HEIGHT / np.sqrt(np.mean(steps**2)))).isel(y=slice(wide[0]), x=slice(wide[1]))
-        result = surfaces.from_array(result.values, SPACING)
-    elif family == "matern":
-        result = surfaces.from_array(HEIGHT * matern(wide, hurst, n / ROLLOFF, count, stream), SPACING)
-    else:
-        result = surfaces.fbm(wide, SPACING, rms_increment=HEIGHT, **options)
-    return _with_defects(result, n, margin, defects, stream)
+    return _with_defects(family.make(hurst, n, margin, count, stream), n, margin, defects, stream)
 
 
-def matern(
-    shape: tuple[int, ...], hurst: float, corner: float, count: int, stream: np.random.Generator
-) -> Array:
+def matern(shape: tuple[int, ...], hurst: float, corner: float, count: int, stream: Stream) -> Array:
     """Return `count` surfaces of unit rms increment with the spectrum (q^2 + q_0^2)^(-1 - H).
 
     `corner` is the wavelength of q_0 in spacings. Exact by circulant embedding: the covariance has fallen to
@@ -242,7 +288,7 @@ def matern(
 
 
 def _with_defects(
-    surface: xr.DataArray, n: int, margin: int, defects: dict[str, float], stream: np.random.Generator
+    surface: xr.DataArray, n: int, margin: int, defects: dict[str, float], stream: Stream
 ) -> xr.DataArray:
     """Blur surfaces, remove their margin, and add noise and marks."""
     result = surface
@@ -261,13 +307,13 @@ def _with_defects(
 
 
 def _sample(
-    family: str,
+    family: Family,
     hurst: float,
     n: int,
     count: int,
     methods: Sequence[str],
     defects: dict[str, float],
-    stream: np.random.Generator,
+    stream: Stream,
 ) -> Array:
     """Return exponent, lower end, upper end and seconds of every estimate, (4, members, methods)."""
     batch = max(1, min(count, BATCH // (n * n)))
@@ -327,7 +373,7 @@ def _empty_table(
     columns = {name: (DIMS, np.full(shape, np.nan)) for name in MEASURED}
     bounds = {"least_error": (DIMS[1:], np.full(shape[1:], np.nan))}
     table = xr.Dataset(columns | bounds | {"member_count": ("size", np.asarray(members))}, coords=coords)
-    table["least_error"].attrs["comment"] = "; ".join(f"{name}: {FAMILIES[name]}" for name in families)
+    table["least_error"].attrs["comment"] = "; ".join(f"{name}: {FAMILIES[name].words}" for name in families)
     return table
 
 

@@ -21,7 +21,7 @@ from fractalcontact.scenes._options import FROM_MATERIAL, given_options, loads_o
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, Scene, Table
 from fractalcontact.scenes._scene_keys import Keys
-from fractalcontact.scenes._stages import PARTIAL_SLIP, STAGES
+from fractalcontact.scenes._stages import STAGES
 
 LARGEST_FILE = 1 << 20  # bytes
 LONGEST_KEY = 32  # parts of a dotted key; the time and the memory of the parser grow with their square
@@ -266,12 +266,11 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
     """Check that the material and the load are there where a wanted result needs them."""
     material = scene.table("material")
     is_elastic = bool({"young", "poisson"} & set(material))
-    pressing = [stage.row for stage in stages_of(scene) if stage.row.presses and stage.row.takes == "crack"]
-    if any(is_elastic or not row.may_be_rigid for row in pressing):
+    pressing = [stage.row for stage in stages_of(scene) if stage.row.presses]
+    if any(row.takes == "crack" and (is_elastic or not row.may_be_rigid) for row in pressing):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
-    slips = PARTIAL_SLIP in (*scene.wanted("contact"), *scene.wanted("joints"))
-    if slips:
+    if any(row.refuses_hardness for row in pressing):
         expected = "no hardness: partial slip is that of elastic bodies"
         problems.require("hardness" not in material, "material.hardness", expected, "a value")
 

@@ -13,14 +13,7 @@ from fractalcontact.base.units import PRESSURE
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import arguments_of
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, Table
-from fractalcontact.scenes._stages import (
-    DOMAIN_STAGES,
-    JOINT_STAGES,
-    PARTIAL_SLIP,
-    STAGES,
-    WANTED,
-    StageType,
-)
+from fractalcontact.scenes._stages import STAGES, WANTED, StageType
 
 Schema = dict[str, Any]
 
@@ -270,15 +263,13 @@ def keys_of(table: str, given: Table | None = None) -> Keys:
         words = {**WANTED, "dimensions": methods}
         kinds = {key: (_choices(words[key]) if key in words else FLAG).about(WANT[key]) for key in WANT}
         return Keys(kinds)
-    if table == "dimensions":  # its methods are those of [want]
-        return Keys(_arguments(key for key in STAGES[table].arguments() if key != "methods"))
-    if table == "contact":
-        return Keys(_arguments(STAGES[table].arguments()), (), {PARTIAL_SLIP: STAGES[PARTIAL_SLIP]})
-    if table == "domains":
-        return Keys({}, (), {name: STAGES[f"domains/{name}"] for name in DOMAIN_STAGES})
-    stages = {name: STAGES[f"joints/{name}"] for name in JOINT_STAGES}
-    common = (key for row in stages.values() for key in row.arguments())
-    return Keys(_arguments(("block", *common)) | OF_JOINT, (), stages)
+    rows = {row.table: row for row in STAGES.values() if row.table.partition(".")[0] == table}
+    stages = {place.partition(".")[2]: row for place, row in rows.items() if place != table}
+    if table == "joint":  # the arguments of its stages may stand in it too
+        common = (key for row in stages.values() for key in row.arguments())
+        return Keys(_arguments(("block", *common)) | OF_JOINT, (), stages)
+    own = rows[table].arguments() if table in rows else ()
+    return Keys(_arguments(key for key in own if key != "methods"), (), stages)  # methods are in [want]
 
 
 def keys_of_stage(row: StageType) -> Keys:

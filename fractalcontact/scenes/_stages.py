@@ -63,8 +63,8 @@ class StageType:
         reads the maps of all steps at once. A scene can ask that of other stages too, see `Stage.whole_path`.
     presses : bool
         It solves a contact: it needs elastic constants, and which loads are possible depends on the heights.
-    may_be_rigid : bool
-        It computes rigid faces where the material has no elastic constants.
+    may_be_rigid, refuses_hardness : bool
+        It computes rigid faces where the material has no elastic constants; it knows elastic bodies alone.
     one_load, one_direction : bool
         It takes one path of load, one direction.
     keys, own : tuple of str
@@ -91,6 +91,7 @@ class StageType:
     whole_path: bool = False
     presses: bool = False
     may_be_rigid: bool = False
+    refuses_hardness: bool = False
     one_load: bool = False
     one_direction: bool = False
     keys: tuple[str, ...] = ()
@@ -209,6 +210,7 @@ _ROWS = (
         f"contact.{PARTIAL_SLIP}",
         keeps=SLIP_MAPS,
         presses=True,
+        refuses_hardness=True,
         one_load=True,
         rows=of_surface.partial_slip,
     ),
@@ -238,7 +240,15 @@ _ROWS = (
         **_ONE,
     ),
     _joint("area_dimension", of_joint.area_dimension, splits=("shear",), presses=True, **_ONE),
-    _joint(PARTIAL_SLIP, of_surface.partial_slip, keeps=SLIP_MAPS, splits=("shear",), presses=True, **_ONE),
+    _joint(
+        PARTIAL_SLIP,
+        of_surface.partial_slip,
+        keeps=SLIP_MAPS,
+        splits=("shear",),
+        presses=True,
+        refuses_hardness=True,
+        **_ONE,
+    ),
     _joint(
         "elastic_dilatancy",
         of_joint.elastic_dilatancy,
@@ -296,7 +306,6 @@ WANTED: Mapping[str, tuple[str, ...]] = {
     name: tuple(word for table, _, word in (row.wanted.partition(".") for row in _ROWS) if table == name)
     for name in ("surfaces", "contact", "joints", "domains")
 } | {"keep": (*CONTACT_MAPS, *SLIP_MAPS, ISLAND_MAP)}
-JOINT_STAGES, DOMAIN_STAGES = WANTED["joints"], WANTED["domains"]
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,10 @@ from fractalcontact.scenes._options import call_options, crack_options, stage_op
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._plausibility import implausible_input, warn
 from fractalcontact.scenes._scan_files import scans_of
-from fractalcontact.scenes._scene import LOADS, PRESS, Scene, SurfaceTable
+from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import check_tables, parse
 from fractalcontact.scenes._scene_keys import GENERATORS
-from fractalcontact.scenes._stages import DOMAIN_STAGES, JOINT_STAGES, STAGES, WANTED, Stage, StageType
+from fractalcontact.scenes._stages import STAGES, WANTED, Stage, StageType
 
 if TYPE_CHECKING:
     from fractalcontact.joints import Crack
@@ -150,11 +150,11 @@ def _with_possible_want(scene: Scene) -> Scene:
     Otherwise a wrong word would hide the problems of the calls.
     """
     want = {name: [word for word in scene.wanted(name) if word in words] for name, words in WANTED.items()}
-    own = {"joints": ("joint", JOINT_STAGES), "domains": ("domains", DOMAIN_STAGES)}
-    for name, (table, stages) in own.items():
-        want[name] += [word for word in scene.table(table) if word in stages]
-    if "contact" in scene.tables:
-        want["contact"].append(PRESS)
+    for row in STAGES.values():
+        name, _, word = row.table.partition(".")
+        if row.table and row.wanted and (word in scene.table(name) if word else name in scene.tables):
+            group, _, asked = row.wanted.partition(".")
+            want[group].append(asked)
     if "dimensions" in scene.tables:
         want["dimensions"] = ["default"]
     possible = {name: list(dict.fromkeys(words)) for name, words in want.items() if words}
