@@ -1,40 +1,62 @@
-"""Single waves of a surface, such as machining marks: found in its white surface, named and removed."""
+"""Single waves of a surface, such as machining marks: named and removed.
+
+Modes of the tapered surface are compared with the modes around them. A single wave stands out against the
+modes in a box about it, and against those on every line through it: a step, or ridges, put their power on a
+line. Modes of a rough surface are exponential numbers; over the mean of n others one exceeds u with the
+probability (1 + u / n)^-n, the statistic of Fisher (1929). What is found is fitted, removed, and the search
+repeated.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base import fft
 from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-from fractalcontact.dimensions._white_surface import LONGEST, WhiteSurface, carrier, is_beside
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
-MOST = 32  # waves that are no multiples; more are a pattern
+FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
+MOST = 32  # sets of marks; more are a pattern
 MOST_REPEATED = 0.1  # share of rows or columns: a surface enlarged by repetition
-_ROUNDS = 24  # of searches: strong waves hide faint ones
-_LEFT = 0.05  # of the mean square increment, below which many waves are all there is
-_NONE_LEFT = 1e-8
+NONE_LEFT = 1e-8  # of the mean square increment: the waves are the surface
+FEW, FEW_LEFT = 3, 0.05  # of more sets of waves that leave so little the same is true
+NAMED = 3  # sets in a note
 _LEAST_SHARE = 1e-5  # of the mean square increment: less changes no estimate
-_NAMED = 3  # waves in a note
-_MULTIPLES = 12  # of a wave that are looked for at their own places
-_DIVISORS = 3  # of them: a wave may itself be the second or third multiple of one
-_FEW = 3
-_BESIDE = 1.5  # modes from a wave that was subtracted
-_SAME = 0.5  # modes between a wave and the multiple that it is
-_MOST_MULTIPLES, _MISSED = 256, 6  # that are looked for where two are known, up to so many that are not there
-_CERTAIN = 8.0  # power of a wave over the expected one, once the strong ones beside it are gone
-_ON_COMB = 4.0  # power of such a multiple over the expected one: 2 % of the modes have it
+_LONGEST = {1: 7.0, 2: 4.0}  # wavenumber steps: longer waves are not told from the form, by number of axes
+_ROUNDS = 12  # of searches
+_FIRST_RING = 3  # steps: longer waves are those of the trend
+_IN_RING = 24  # modes, at least, of which a level is the median: it scatters by 40 %
+_WIDE, _NARROW = {1: 25, 2: 13}, 5  # edges of the box of modes about one, by number of axes, and of its gap
+_FALL = math.log(2.0)  # of the level from ring to ring, at most: a band may end inside a ring
+_CORRELATED = 1.5  # modes along an axis for one that is independent, under a sine taper
+_MARGIN = 12  # modes on either side of one that are compared with it
+_STEPS = np.r_[-_MARGIN:-2, 3 : _MARGIN + 1]  # on lines through it, beyond those that a taper correlates
+_DIRECTIONS = 24  # of lines: at 12 modes from one they are 1.6 modes apart
+_OF_LINE = 8.0  # independent modes of a line: with 12, waves in 9 of 80 surfaces with ridges, not in 4
+_OUTLYING = 8.0  # modes of a line count up to so many times their median: multiples are among them
+_ON_LINES = 8  # modes, at least, among which one is tested against its lines
+_SHADOW = 1e-2  # of the strongest power: weaker waves wait, as a strong one has lobes beyond the box
+_APART = 2.5  # modes between two waves under a taper
+_WIDTHS = 0.5, 0.2, 0.08, 0.03  # modes between frequencies whose parabola has the largest power
+_ALMOST_TWO_SPACINGS = 1e-3  # of the power: no sine is left there
+_LARGEST_RATIO = 1e8  # of a mode that counts in the mean of a box: beyond, running sums lose the others
+_ROUNDING = 1e-22  # of the strongest mode
+_LEAST_POWER = 1e-280  # of the strongest mode: that of a constant is zero
+_MULTIPLES = 24  # of a wave that are named with it
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
 
@@ -73,11 +95,11 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     Notes
     -----
     Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent (a
-    seventh of a profile). Among N points a wave is found from an amplitude of about 8 sqrt(S / N) on, S being
-    the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is 0.1 rms
-    increments at 6 spacings, 0.3 at 12 and 0.8 at 24 (H = 0.5); at 256 x 256 half of it. Multiples of a
-    wave that are shorter than two spacings are listed at their aliases. `estimate` removes what is found.
-    Detection, false alarms and accuracy: page `estimator_accuracy`.
+    seventh of a profile). Among N points a wave is found from an amplitude of about 13 sqrt(S / N) on, S
+    being the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is
+    0.2 rms increments at 6 spacings, 0.5 at 12 and 2 at 24 (H = 0.5); at 256 x 256 half of it or less.
+    Multiples of a wave that are shorter than two spacings are listed at their aliases. `estimate` removes
+    what is found. Detection and its limits: pages `theory_dimensions` and `estimator_accuracy`.
 
     References
     ----------
@@ -105,22 +127,31 @@ class Wave:
     wavelength, azimuth, amplitude : float
         In m, degrees, and m.
     p_value : float
-    cycles : (y, x)
+    cycles : ndarray, (y, x)
         Per point.
-    cosine, sine : float
-        Amplitudes in the unit of the scaled heights, with the phase 0 at the first point.
-    on_comb : bool
-        Looked for at a multiple of others, whose frequency it has.
+    phasor : complex
+        Amplitude in the unit of the scaled heights, with the phase at the first point.
     """
 
     wavelength: float
     azimuth: float
     amplitude: float
     p_value: float
-    cycles: tuple[float, float]
-    cosine: float
-    sine: float
-    on_comb: bool = False
+    cycles: Array
+    phasor: complex
+
+    @classmethod
+    def of(cls, surface: Surface, cycles: Array, phasor: complex, p_value: float) -> Wave:
+        """Return a wave in the units of a surface."""
+        y, x = np.asarray(cycles) / np.array(surface.spacing)
+        azimuth = float(np.degrees(np.arctan2(y, x)) % 180.0)
+        return cls(float(1.0 / np.hypot(y, x)), azimuth, abs(phasor) * surface.unit, p_value, cycles, phasor)
+
+    def heights(self, shape: tuple[int, ...]) -> Array:
+        """Return the scaled heights of the wave."""
+        row, column = (np.exp(2j * np.pi * f * np.arange(n)) for f, n in zip(self.cycles, shape, strict=True))
+        row *= self.phasor
+        return np.asarray(np.outer(row.real, column.real) - np.outer(row.imag, column.imag))
 
 
 def without_waves(surface: Surface) -> tuple[Surface, str]:
@@ -134,253 +165,261 @@ def without_waves(surface: Surface) -> tuple[Surface, str]:
     found = find_waves(surface)
     if not found:
         return surface, ""
-    heights = _subtracted(surface.heights, found)
+    heights = surface.heights.copy()
+    for wave in found:
+        heights -= wave.heights(heights.shape)
     left = _mean_square_increment(heights) / _mean_square_increment(surface.heights)
-    combs = [members for _, members in _combs(found, heights.shape)]
-    if left < (_LEFT if len(combs) > _FEW else _NONE_LEFT) or _is_progression(found):
+    sets = _sets(found, heights.shape)
+    if left < (FEW_LEFT if len(sets) > FEW else NONE_LEFT) or _is_progression(found):
         return surface, ""
-    named = ", ".join(map(_name, combs[:_NAMED]))
-    more = f" and {len(combs) - _NAMED} weaker ones" if len(combs) > _NAMED else ""
-    count = f"{len(combs)} single waves" if len(combs) > 1 else "a single wave"
-    without = surface.with_heights(heights)
-    return without, f"{count} removed: {named}{more}"
+    named = ", ".join(map(_name, sets[:NAMED]))
+    more = f" and {len(sets) - NAMED} weaker ones" if len(sets) > NAMED else ""
+    count = f"{len(sets)} single waves" if len(sets) > 1 else "a single wave"
+    return surface.with_heights(heights), f"{count} removed: {named}{more}"
 
 
-def _name(comb: dict[int, Wave]) -> str:
-    first, wave = min(comb.items())
-    others = f" and {len(comb) - 1} of its multiples" if len(comb) > 1 else ""
-    if first > 1:
-        others = f" and {len(comb) - 1} more multiples of {wave.wavelength * first:.3g} m"
+def _name(members: Sequence[Wave]) -> str:
+    first = members[0]
+    others = f" and {len(members) - 1} of its multiples" if len(members) > 1 else ""
     return (
-        f"{wave.wavelength:.3g} m at {wave.azimuth:.0f} degrees with the amplitude "
-        f"{wave.amplitude:.2g} m{others}"
+        f"{first.wavelength:.3g} m at {first.azimuth:.0f} degrees with the amplitude "
+        f"{first.amplitude:.2g} m{others}"
     )
 
 
 def _is_progression(found: Sequence[Wave]) -> bool:
     """Return whether more than a few wavelengths have one ratio from each to the next."""
     ratios = np.diff(np.log(np.sort([wave.wavelength for wave in found])))
-    return len(found) > _FEW and bool(np.ptp(ratios) < 0.02 * ratios.mean())
+    return len(found) > FEW and bool(np.ptp(ratios) < 0.02 * ratios.mean())
+
+
+def _sets(found: Sequence[Wave], shape: tuple[int, ...]) -> list[list[Wave]]:
+    """Sort waves by the one whose multiples they are, which comes first; the strongest set first."""
+    left, sets = sorted(found, key=lambda wave: -wave.wavelength), []
+    while left:
+        places = [k * left[0].cycles for k in range(1, _MULTIPLES + 1)]
+        members = [wave for wave in left if any(_is_beside(wave.cycles, at, shape, 1.0) for at in places)]
+        left = [wave for wave in left if wave not in members]
+        sets.append(members)
+    return sorted(sets, key=lambda members: -max(wave.amplitude for wave in members))
 
 
 def find_waves(surface: Surface) -> list[Wave]:
     """Return the single waves of a complete surface or profile, the strongest first.
 
-    Waves are searched in rounds, as a strong one hides others; none if there are more than a few dozen. The
-    multiples of a wave, which the cusps of a turned surface have, are few places, and stand on its ray.
-    Blocks of equal heights are periodic, but no waves.
+    None if there are more than a few dozen. Blocks of equal heights are periodic, but no waves.
     """
     if surface.repeated_share > MOST_REPEATED:
         return []
-    heights, shape = surface.heights, surface.heights.shape
-    crop = tuple(
-        slice((n - size) // 2, (n - size) // 2 + size)
-        for n, size in zip(shape, np.minimum(shape, LARGEST_CROP), strict=True)
-    )
-    is_whole = max(shape) <= LARGEST_CROP
-    is_periodic = all(surface.grid.periodic) and is_whole
-
-    def whitened(heights: Array, is_tapered: bool) -> WhiteSurface:
-        part = without_trend(heights, plane=not is_periodic)
-        spacing = surface.plane_spacing
-        return WhiteSurface.of(part, spacing, is_periodic=is_periodic, is_tapered=is_tapered)
-
+    shape = surface.shape
+    crop = tuple(slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for n in shape)
+    is_part = max(shape) > LARGEST_CROP
+    is_periodic = all(surface.grid.periodic) and not is_part
+    rest = without_trend(surface.heights, plane=not is_periodic)
+    part = rest[crop]  # a view: it changes with the rest
+    search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
     found: list[Wave] = []
-    new: list[Wave] = []
-    is_tapered = not is_periodic  # strong waves first
     for _ in range(_ROUNDS):
-        if new and is_whole and not is_periodic:
-            # without strong waves the surface is whiter, and its waves are measured better
-            white = whitened(heights, is_tapered)
-            corrected = [_corrected(surface, wave, white) for wave in new]
-            heights = _subtracted(heights, new, -1.0)
-            new = [
-                wave
-                for wave, ratio in corrected
-                if is_tapered or ratio > min(_CERTAIN, -0.5 * np.log(max(wave.p_value, 1e-300)))
-            ]
-            heights = _subtracted(heights, new)
-        found += new
-        if len(found) > MOST and len(_combs(found, heights.shape)) > MOST:
+        peaks = search.peaks(part)
+        for at, p_value in peaks:
+            # what a wave has left of itself: it is fitted again
+            again = [wave for wave in found if _is_beside(at, wave.cycles, part.shape)]
+            for wave in again:
+                rest += wave.heights(shape)
+                found.remove(wave)
+            start = again[0].cycles if again else at
+            if is_part and not again:
+                start = _fitted(part, start, is_periodic)[0]
+            wave = Wave.of(surface, *_fitted(rest, start, is_periodic), p_value)
+            rest -= wave.heights(shape)
+            found.append(wave)
+        if len(found) > MOST and len(_sets(found, shape)) > MOST:
             return []
-        white = whitened(heights[crop], is_tapered)
-        new = _of_combs(surface, found, white) if is_whole and not is_tapered else []
-        peaks = [] if new else white.peaks(_related(found, white.white.shape))
-        whole = white if is_whole or not peaks else whitened(heights, is_tapered)
-        for peak in peaks:
-            at = peak.cycles if is_whole else whole.refined(peak.cycles, max(shape) / LARGEST_CROP)[0]
-            if beside := [wave for wave in found if is_beside(at, np.array(wave.cycles), shape)]:
-                # what a wave has left of itself: both are fitted as one
-                heights = _subtracted(heights, beside, -1.0)
-                found = [wave for wave in found if wave not in beside]
-                at, whole = np.array(beside[0].cycles), whitened(heights, is_tapered)
-            cycles, amplitudes = whole.fitted(at, peak.ratio)
-            wave = _named(surface, cycles, amplitudes, peak.p_value)
-            if _share(heights, wave) > _LEAST_SHARE:
-                new.append(wave)
-        heights = _subtracted(heights, new)
-        if not (new or is_tapered) or _is_progression(found):
+        if not peaks:
             break
-        if is_tapered and not new:  # all of them are measured again, without the taper
-            is_tapered, found, new = False, [], found
     return sorted(found, key=lambda wave: -wave.amplitude)
 
 
-def _corrected(surface: Surface, wave: Wave, white: WhiteSurface) -> tuple[Wave, float]:
-    """Return a wave that was subtracted, with what is left of it in a white surface, and its power there."""
-    cycles, amplitudes = np.array(wave.cycles), np.array([wave.cosine, wave.sine])
-    shift, rest = (0.0, np.array(white.wave(cycles)[:2])) if wave.on_comb else white.step(cycles, amplitudes)
-    corrected = _named(surface, cycles + shift, amplitudes + rest, wave.p_value, on_comb=wave.on_comb)
-    return corrected, white.power_of(cycles, amplitudes + rest)
+def _fitted(heights: Array, start: Array, is_periodic: bool) -> tuple[Array, complex]:
+    """Return cycles per point and phasor of a wave, fitted by least squares under the taper.
 
-
-def _combs(found: Sequence[Wave], shape: tuple[int, ...]) -> list[tuple[Array, dict[int, Wave]]]:
-    """Sort waves by the one whose multiples they are: its cycles per point, and the waves by their multiple.
-
-    The multiples of marks, as those of a sawtooth, may be found where the first of them is not.
+    The frequency is that of the largest power near `start`; of a periodic surface it is `start`.
     """
-    left, result = sorted(found, key=lambda wave: -wave.amplitude), []
-    while left:
-        best: dict[int, Wave] = {}
-        cycles = np.array([wave.cycles for wave in left])
-        divisors = np.arange(1, _MULTIPLES + 1)
-        all_apart = _apart(cycles, cycles[0] / divisors[:, None], 2 * _MULTIPLES, shape)
-        for divisor, apart in enumerate(all_apart, 1):
-            least = max(len(best), 1 + (divisor > _DIVISORS))
-            may_be = int(np.count_nonzero((apart < _SAME).any(axis=0)))
-            if may_be > least and len(members := _members(left, apart)) > least:
-                best = members
-        best = best or {1: left[0]}
-        if len(best) > _FEW:
-            best |= _members(left, _apart(cycles, _base(best, shape), _MOST_MULTIPLES, shape))
-        left = [wave for wave in left if wave not in best.values()]
-        result.append((_base(best, shape), best))
-    return result
+    tapers = [_taper(n, is_periodic) for n in heights.shape]
+
+    def modes(y: Array, x: Array) -> Array:
+        carrier = tapers[1][:, None] * np.exp(-2j * np.pi * np.outer(np.arange(heights.shape[1]), x))
+        right = heights @ carrier.real + 1j * (heights @ carrier.imag)
+        return np.asarray(tapers[0] * np.exp(-2j * np.pi * np.outer(y, np.arange(heights.shape[0]))) @ right)
+
+    cycles = np.array(start)
+    for width in () if is_periodic else _WIDTHS:
+        steps = [width / n * np.arange(-1.0, 2.0) if n > 1 else np.zeros(1) for n in heights.shape]
+        logs = np.log(np.abs(modes(cycles[0] + steps[0], cycles[1] + steps[1])) + 1e-300)
+        middle = logs.shape[0] // 2
+        for axis, line in enumerate((logs[:, 1], logs[middle])):
+            if line.size == 3:
+                bend = line[0] - 2.0 * line[1] + line[2]
+                shift = 0.5 * (line[0] - line[2]) / bend if bend < 0.0 else np.sign(line[2] - line[0])
+                cycles[axis] += float(np.clip(shift, -2.0, 2.0)) * width / heights.shape[axis]
+    mode = complex(modes(cycles[:1], cycles[1:])[0, 0])
+    total = math.prod(float(taper.sum()) for taper in tapers)
+    double = math.prod(
+        complex(taper @ np.exp(-4j * np.pi * f * np.arange(taper.size)))
+        for f, taper in zip(cycles, tapers, strict=True)
+    )
+    if total - abs(double) < _ALMOST_TWO_SPACINGS * total:
+        return cycles, mode / total
+    # the mode is that of the wave and of its mirror image: 2 M = p S(0) + p* S(2 f)
+    return cycles, 2.0 * (mode * total - mode.conjugate() * double) / (total**2 - abs(double) ** 2)
 
 
-def _apart(cycles: Array, bases: Array, most: int, shape: tuple[int, ...]) -> Array:
-    """Return how many modes waves are apart from the multiples of bases: (..., multiple below most, wave)."""
-    multiples = np.arange(1, most)[:, None] * bases[..., None, :]
-    return _unfolded(cycles, multiples[..., None, :], shape)[1]
+@dataclass(frozen=True)
+class Search:
+    """Search for waves among the tapered modes of one shape, on the half-plane of x wavenumbers.
 
+    Attributes
+    ----------
+    tapers : (y, x)
+    order, ends : ndarray of int
+        Modes sorted by the ring of wavenumbers that has their level, and the end of each ring.
+    log_ring, log_q : ndarray
+        Logarithms of the wavenumber of each ring and of each mode, in steps.
+    number : ndarray
+        Modes among which each is tested: every octave of wavelength has the same share of the false alarms.
+        Infinite where none is tested.
+    box, gap : tuple of int
+        Shape of the box of modes about one, and of its gap.
+    freedom : float
+        Independent modes in the box.
+    """
 
-def _members(waves: Sequence[Wave], apart: Array) -> dict[int, Wave]:
-    """Return the waves that are multiples of a base, by their multiple; `apart` as of `_apart`."""
-    members: dict[int, Wave] = {}
-    for row, column in np.argwhere(apart < _SAME):
-        if waves[column] not in members.values():
-            members.setdefault(int(row) + 1, waves[column])
-    return members
+    tapers: tuple[Array, Array]
+    order: Array
+    ends: Array
+    log_ring: Array
+    log_q: Array
+    number: Array
+    box: tuple[int, int]
+    gap: tuple[int, int]
+    freedom: float
 
+    def peaks(self, heights: Array) -> list[tuple[Array, float]]:
+        """Return cycles per point and probability of modes that stand out, the strongest first."""
+        from scipy.ndimage import maximum_filter
 
-def _base(members: dict[int, Wave], shape: tuple[int, ...]) -> Array:
-    """Return the cycles per point of a wave from those of its multiples, the most certain of them first."""
-    multiple, strongest = max(members.items(), key=lambda member: member[1].amplitude)
-    base = np.array(strongest.cycles) / multiple
-    # the power of a wave over that of the surface, whose exponent is taken as 0.5
-    weights = {k: (wave.amplitude * wave.wavelength**-1.5) ** 2 for k, wave in members.items()}
-    total = sum(weight * k * k for k, weight in weights.items())
-    return np.asarray(
-        sum(
-            weights[k] * k * _unfolded(np.array(wave.cycles), base * k, shape)[0]
-            for k, wave in members.items()
+        ny, nx = heights.shape
+        modes = fft.rfft2(heights * self.tapers[0][:, None] * self.tapers[1])
+        power = modes.real**2 + modes.imag**2
+        if float(power.max()) < _LEAST_POWER:
+            return []
+        y, x = np.fft.fftfreq(ny), np.arange(nx // 2 + 1) / nx
+        increment = power * (2.0 - np.cos(2.0 * np.pi * y)[:, None] - np.cos(2.0 * np.pi * x))
+        ratio = self._ratio(power)
+        tail = self._tail(ratio)
+        is_high = (np.log(self.number / FALSE_ALARM) < tail) & (increment > _LEAST_SHARE * increment.sum())
+        rows, columns = np.nonzero(is_high)
+        above = ratio[rows, columns + _MARGIN] / _line_level(ratio, rows, columns + _MARGIN)
+        limit = math.log(max(_ON_LINES, rows.size) / FALSE_ALARM)
+        is_high[rows, columns] = _OF_LINE * np.log1p(above / _OF_LINE) > limit
+        is_high &= power >= maximum_filter(power, self.gap, mode=("wrap", "nearest"))
+        rows, columns = np.nonzero(is_high & (power > _SHADOW * power[is_high].max(initial=0.0)))
+        found: list[tuple[Array, float]] = []
+        for place in np.argsort(-power[rows, columns]):
+            row, column = rows[place], columns[place]
+            cycles = np.array([y[row], x[column]])
+            if not any(_is_beside(cycles, other, heights.shape) for other, _ in found):
+                p_value = float(self.number[row, column] * np.exp(-tail[row, column]))
+                found.append((cycles, p_value))
+        return found
+
+    def _ratio(self, power: Array) -> Array:
+        """Return modes over the level of their ring, with `_MARGIN` more columns on either side."""
+        from scipy.ndimage import maximum_filter1d
+
+        levels = np.array([np.median(ring) for ring in np.split(power.ravel()[self.order], self.ends)])
+        logs = np.log(np.maximum(levels / math.log(2.0), _ROUNDING * float(power.max())))
+        logs = np.maximum(logs, maximum_filter1d(logs, 3) - _FALL)
+        ratio = np.minimum(power / np.exp(np.interp(self.log_q, self.log_ring, logs)), _LARGEST_RATIO)
+        ratio[self.log_q < math.log(_FIRST_RING - 0.5)] = 1.0
+        nx = self.tapers[1].size
+        columns = np.arange(-_MARGIN, ratio.shape[1] + _MARGIN) % nx
+        is_mirrored = columns > nx // 2
+        wide = ratio[:, np.where(is_mirrored, nx - columns, columns)]
+        wide[:, is_mirrored] = wide[np.ix_(-np.arange(ratio.shape[0]) % ratio.shape[0], is_mirrored)]
+        return np.asarray(wide)
+
+    def _tail(self, ratio: Array) -> Array:
+        """Return minus the logarithm of the probability of each mode, from those in the box about it."""
+        from scipy.ndimage import uniform_filter
+
+        box, gap = (
+            uniform_filter(ratio, size, mode=("wrap", "nearest")) * math.prod(size)
+            for size in (self.box, self.gap)
         )
-        / total
-    )
+        around = (box - gap) / (math.prod(self.box) - math.prod(self.gap))
+        level = np.maximum(around, 1.0)  # that of the ring: beyond the end of a band are no modes
+        tail = self.freedom * np.log1p(ratio / (level * self.freedom))
+        return np.asarray(tail[:, _MARGIN:-_MARGIN])
 
 
-def _unfolded(waves: Array, cycles: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
-    """Return the cycles of waves before sampling, the nearest to some, and how many modes they are apart."""
-    both = [waves + np.rint(cycles - waves), np.rint(cycles + waves) - waves]
-    apart = [np.maximum(*np.moveaxis(np.abs((each - cycles) * shape), -1, 0)) for each in both]
-    return np.where((apart[0] <= apart[1])[..., None], *both), np.minimum(*apart)
+@lru_cache(maxsize=2)  # of a surface and its parts
+def _search(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: bool) -> Search:
+    ny, nx = shape
+    axes = 1 if ny == 1 else 2
+    extent = min(n * d for n, d in zip(shape[-axes:], spacing[-axes:], strict=True))
+    y, x = np.fft.fftfreq(ny) * extent / spacing[0], np.arange(nx // 2 + 1) / nx * extent / spacing[1]
+    q = np.hypot(y[:, None], x)
+    # rings are a step wide, or wider until they have enough modes
+    step = np.rint(q).astype(np.int64)
+    count = np.bincount(step.ravel())
+    count[:_FIRST_RING] = 0
+    ring = np.where(step < _FIRST_RING, -1, (np.cumsum(count) // _IN_RING)[step]).ravel()
+    order = np.argsort(ring, kind="stable")[np.count_nonzero(ring < 0) :]
+    ends = np.flatnonzero(np.diff(ring[order])) + 1
+    log_q = np.log(np.maximum(q, 1.0))
+    log_ring = np.array([part.mean() for part in np.split(log_q.ravel()[order], ends)])
+    is_tested = q >= _LONGEST[axes]
+    share = np.where(is_tested, np.maximum(q, 1.0) ** -float(axes), 0.0)
+    share[:, 0] *= 0.5  # each of these modes is there twice
+    number = np.where(is_tested, share.sum() * q**axes, np.inf)
+    box = (1, _WIDE[1]) if axes == 1 else (_WIDE[2], _WIDE[2])
+    gap = (1, _NARROW) if axes == 1 else (_NARROW, _NARROW)
+    around = math.prod(box) - math.prod(gap)
+    freedom = around / (1.0 if is_periodic else _CORRELATED**axes)
+    tapers = _taper(ny, is_periodic), _taper(nx, is_periodic)
+    return Search(tapers, order, ends, log_ring, log_q, number, box, gap, freedom)
 
 
-def _of_combs(surface: Surface, found: Sequence[Wave], white: WhiteSurface) -> list[Wave]:
-    """Return further multiples of waves of which two are known: as their places are, little is enough."""
-    shape, level = white.white.shape, None
-    new: list[Wave] = []
-    for base, members in _combs(found, shape):
-        if len(members) < 2:
-            continue
-        level = level or white.level()
-        missed = 0
-        known = np.array([wave.cycles for wave in [*found, *new]])
-        multiples = np.setdiff1d(np.arange(1, _MOST_MULTIPLES), list(members))
-        places = (multiples[:, None] * base + 0.5) % 1.0 - 0.5
-        is_free = _unfolded(known, places[:, None], shape)[1].min(axis=1) >= _BESIDE
-        is_free &= np.hypot(*(places * shape).T) >= LONGEST[surface.axes]
-        own: list[Array] = []
-        for cycles in places[is_free]:
-            if missed > _MISSED:
-                break
-            if own and _unfolded(np.array(own), cycles, shape)[1].min() < _BESIDE:
-                continue
-            cosine, sine, ratio = white.wave(cycles)
-            ratio /= level.at(cycles)
-            missed += 1
-            if ratio > _ON_COMB:
-                missed = 0
-                own.append(cycles)
-                new.append(_named(surface, cycles, (cosine, sine), float(np.exp(-ratio)), on_comb=True))
-    return new
+def _taper(n: int, is_periodic: bool) -> Array:
+    # a Hann taper hides half as much again of the power of a wave along each axis, and a sine taper a quarter
+    return np.ones(n) if is_periodic or n == 1 else np.sin(np.pi * (np.arange(n) + 0.5) / n)
 
 
-def _related(found: Sequence[Wave], shape: tuple[int, ...]) -> list[Array]:
-    """Return the cycles per point of the multiples of single waves, and of those whose multiples they may be.
+def _line_level(ratio: Array, rows: Array, columns: Array) -> Array:
+    """Return the largest mean of the modes on lines through some modes, in many directions.
 
-    Multiples shorter than two spacings are seen at their aliases. Each place is listed once.
+    The ray of ridges that are drawn with steps is folded at two spacings, and keeps its direction.
     """
-    done, related = [np.array(wave.cycles) for wave in found], []
-    for wave in (next(iter(members.values())) for _, members in _combs(found, shape) if len(members) == 1):
-        for divisor in range(1, _DIVISORS + 1):
-            for multiple in range(1, _MULTIPLES + 1):
-                at = np.array(wave.cycles) * multiple / divisor
-                if divisor > 1 and float(np.abs(at).max()) > 0.5:
-                    break
-                at = (at + 0.5) % 1.0 - 0.5
-                if _unfolded(np.array(done), at, shape)[1].min() > 1.0:
-                    done.append(at)
-                    related.append(at)
-    return related
+    ny = ratio.shape[0]
+    angles: list[Any] = [np.pi * k / _DIRECTIONS for k in range(_DIRECTIONS if ny > 1 else 1)]
+    if ny > 1:
+        angles.append(np.arctan2((rows + ny // 2) % ny - ny // 2, columns - _MARGIN)[:, None])
+    level = np.ones(rows.size)
+    for angle in angles:
+        along_y, along_x = (np.rint(_STEPS * f(angle)).astype(np.int64) for f in (np.sin, np.cos))
+        modes = ratio[(rows[:, None] + along_y) % ny, columns[:, None] + along_x]
+        most = _OUTLYING * np.median(modes, axis=1, keepdims=True)
+        np.maximum(level, np.minimum(modes, most).mean(axis=1), out=level)
+    return level
 
 
-def _named(
-    surface: Surface,
-    cycles: Array,
-    amplitudes: Sequence[float] | Array,
-    p_value: float,
-    on_comb: bool = False,
-) -> Wave:
-    """Return a wave of given cycles per point and amplitudes of its cosine and sine, in SI units."""
-    waves_per_metre = np.array(cycles) / np.array(surface.spacing)
-    return Wave(
-        wavelength=float(1.0 / np.hypot(*waves_per_metre)),
-        azimuth=float(np.degrees(np.arctan2(*waves_per_metre)) % 180.0),
-        amplitude=float(np.hypot(*amplitudes)) * surface.unit,
-        p_value=p_value,
-        cycles=(float(cycles[0]), float(cycles[1])),
-        cosine=float(amplitudes[0]),
-        sine=float(amplitudes[1]),
-        on_comb=on_comb,
+def _is_beside(cycles: Array, other: Array, shape: tuple[int, ...], apart: float = _APART) -> bool:
+    """Return whether two waves, as they are or one of them reversed, are nearer than some modes."""
+    return any(
+        float(np.max(np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape)) < apart
+        for sign in (1.0, -1.0)
     )
-
-
-def _subtracted(heights: Array, found: Sequence[Wave], factor: float = 1.0) -> Array:
-    """Return heights less `factor` times some waves."""
-    result = heights.copy()
-    for wave in found:
-        result -= (carrier(heights.shape, wave.cycles) * (factor * complex(wave.cosine, -wave.sine))).real
-    return result
-
-
-def _share(heights: Array, wave: Wave) -> float:
-    """Return the mean square increment of a wave over that of some heights, along both axes."""
-    total = sum(
-        float(np.mean(np.diff(heights, axis=axis) ** 2)) for axis in (0, 1) if heights.shape[axis] > 1
-    )
-    square = wave.cosine**2 + wave.sine**2
-    return float(square * np.sum(1.0 - np.cos(2.0 * np.pi * np.array(wave.cycles)))) / max(total, 1e-300)
 
 
 def _mean_square_increment(heights: Array) -> float:
