@@ -253,7 +253,8 @@ class _Sums:
         self.total, self.lnq = np.zeros(count.size), np.zeros(count.size)
         self.places = np.full((count.size, size), -1)
         y, x = lattice.wavenumbers
-        _add(number, values, y, x, count, self.total, self.lnq, self.places)
+        rank, filled = np.zeros(count.size), np.zeros(count.size, dtype=np.int64)
+        _add(number, values, y, x, count, rank, filled, self.total, self.lnq, self.places)
 
 
 def _classes(lattice: Lattice, keep: Array, width: float, split: float) -> tuple[Array, Array]:
@@ -304,17 +305,25 @@ def _classify(
             k = 2 * ring
             if lowest + width * ring > split:
                 a, b = abs(y[r]) * dy, abs(x[c])
-                k += min(a, b) > math.tan(math.pi / 8.0) * max(a, b)
+                k += (a if a < b else b) > math.tan(math.pi / 8.0) * (b if a < b else a)
             number[r, c] = k
             count[k] += 1.0
 
 
 @kernel
 def _add(
-    number: Array, values: Array, y: Array, x: Array, count: Array, total: Array, lnq: Array, places: Array
+    number: Array,
+    values: Array,
+    y: Array,
+    x: Array,
+    count: Array,
+    rank: Array,
+    filled: Array,
+    total: Array,
+    lnq: Array,
+    places: Array,
 ) -> None:
-    """Add the values and ln q of the modes of each class; fill the sample."""
-    rank, filled = np.zeros(count.size), np.zeros(count.size, dtype=np.int64)
+    """Add the values and ln q of the modes of each class; fill the sample. `rank` and `filled` are zero."""
     size = places.shape[1]
     for r in range(y.size):
         for c in range(x.size):
@@ -323,7 +332,8 @@ def _add(
                 continue
             total[k] += values[r, c]
             lnq[k] += 0.5 * math.log(y[r] * y[r] + x[c] * x[c])
-            if rank[k] * min(1.0, size / count[k]) >= filled[k]:
+            share = size / count[k]
+            if rank[k] * (share if share < 1.0 else 1.0) >= filled[k]:
                 places[k, filled[k]] = r * x.size + c
                 filled[k] += 1
             rank[k] += 1.0

@@ -396,8 +396,9 @@ def bin_power(
         weight *= ratio
     weights[last] *= tail(hurst, t[last], theta[1], form, axes)
     # between the spreads of the table the logarithm is a cubic; the power is even in s
-    place = min(math.asinh(theta[1] / nodes[0]) / nodes[1], table.shape[0] - 2.0)
-    i = min(int(place), table.shape[0] - 3)
+    place, last_place = math.asinh(theta[1] / nodes[0]) / nodes[1], table.shape[0] - 2.0
+    place = place if place < last_place else last_place
+    i = int(place) if place < last_place - 1.0 else table.shape[0] - 3
     f = place - i
     a0, a1 = -f * (f - 1.0) * (f - 2.0) / 6.0, (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0
     a2, a3 = -(f + 1.0) * f * (f - 2.0) / 2.0, (f + 1.0) * f * (f - 1.0) / 6.0
@@ -439,9 +440,9 @@ def _parameters(u: Array, fixed: Array, prior: Array, theta: Array) -> None:
             theta[k] = math.exp(value) if k == 3 or k == 5 else value
     if theta[5] == 0.0:  # the powers of a surface and of a smoother one add up
         theta[4] = theta[0] + (high[0] - theta[0]) * 0.5 * math.erfc(-u[4] / math.sqrt(2.0))
-        theta[5] = max(theta[4] - theta[0], 0.01)
+        theta[5] = 0.01 if theta[4] - theta[0] < 0.01 else theta[4] - theta[0]
     if theta[3] > 0.0 and theta[1] > 0.0:  # an octave of waves between corner and blur shows the exponent H
-        theta[3] = min(theta[3], 0.5 / theta[1])
+        theta[3] = 0.5 / theta[1] if 0.5 / theta[1] < theta[3] else theta[3]
 
 
 @inner_kernel
@@ -466,7 +467,10 @@ def _factorise(matrix: Array, lower: Array) -> float:
             value = matrix[i, j]
             for k in range(j):
                 value -= lower[i, k] * lower[j, k]
-            lower[i, j] = math.sqrt(max(value, 1e-300)) if i == j else value / lower[j, j]
+            if i == j:
+                lower[i, j] = math.sqrt(1e-300 if value < 1e-300 else value)
+            else:
+                lower[i, j] = value / lower[j, j]
         logarithm += math.log(lower[i, i])
     return logarithm
 
@@ -554,9 +558,11 @@ def _maxima(
     models = np.empty((starts.shape[0], bins))
     model, shifted, residual, trial_residual = np.empty(bins), np.empty(bins), np.empty(bins), np.empty(bins)
     jacobian = np.empty((p, bins))
-    hessian, lower, damped = np.empty((p, p)), np.zeros((p, p)), np.empty((p, p))
+    hessian, lower, damped = np.empty((p, p)), np.empty((p, p)), np.empty((p, p))
     gradient, move, u, trial = np.empty(p), np.empty(p), np.empty(p), np.empty(p)
-    before, after, totals = np.zeros(p), np.zeros(p), np.empty(starts.shape[0])
+    before, after, totals = np.empty(p), np.empty(p), np.empty(starts.shape[0])
+    for i in range(p):
+        after[i] = 0.0
     for m in range(fixed.shape[0]):
         held, table, form, free = fixed[m], tables[forms[m]], forms[m], 0
         problem = (held, prior, form, axes, table, nodes, t, white, lnq)
@@ -617,7 +623,8 @@ def _maxima(
                         _solve(lower, gradient, move)
                         longest = 0.7
                         for i in range(p):
-                            longest = max(longest, abs(move[i]))
+                            if abs(move[i]) > longest:
+                                longest = abs(move[i])
                         for i in range(p):
                             trial[i] = u[i] + move[i] * (0.7 / longest)
                         total = _misfit(trial, values, shifted, trial_residual, white_k, level, *problem)
