@@ -28,7 +28,7 @@ from fractalcontact.base.errors import (
 )
 from fractalcontact.base.file_patterns import is_pattern
 from fractalcontact.base.memory import require_libraries
-from fractalcontact.base.process import block_dask_import
+from fractalcontact.base.process import block_dask_import, collect_rarely
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
@@ -74,8 +74,10 @@ QUESTIONS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     options = _parsers()[0].parse_args(arguments)
-    if arguments is None and getattr(options, "scheduler", None) is None:
-        block_dask_import()
+    if arguments is None:
+        collect_rarely()
+        if getattr(options, "scheduler", None) is None:
+            block_dask_import()
     warnings.showwarning = _WarningPrinter()
     try:
         require_libraries()
