@@ -112,7 +112,8 @@ def copied_command(*words, largest_file=None):
 @functools.cache
 def _orders():
     """Start the process that is copied, which ends with this one; return the socket for orders."""
-    scene = Path(tempfile.mkdtemp(), "study.toml")
+    folder = tempfile.TemporaryDirectory()
+    scene = Path(folder.name, "study.toml")
     scene.write_text(SOUND, encoding="utf-8")
     ours, theirs = socket.socketpair()
     with theirs:
@@ -121,5 +122,5 @@ def _orders():
         # with one thread no thread is started, and a copy has all that the process had
         environment = os.environ | {"FRACTALCONTACT_THREADS": "1"}
         server = subprocess.Popen(words, pass_fds=[theirs.fileno()], env=environment)
-    atexit.register(lambda: (ours.close(), server.wait()))
+    atexit.register(lambda: (ours.close(), server.wait(), folder.cleanup()))
     return ours

@@ -131,7 +131,7 @@ figures = true
 """
 
 
-@pytest.mark.parametrize("word", ["../../escaped", "/tmp/fractalcontact_escaped", "$(touch escaped)", "a/b"])
+@pytest.mark.parametrize("word", ["../../escaped", "/tmp/fractalcontact_escaped", "$(touch escaped)"])
 def test_nothing_is_written_outside_the_folder(tmp_path, word):
     folder = tmp_path / "study"
     folder.mkdir()
@@ -164,7 +164,11 @@ readers = {
     "load": lambda path: fc.scenes.load(path),
     "template": lambda path: fc.scenes.template("roughness", path),
 }
-for path in sys.argv[1:]:
+try:
+    fc.scenes.validate(sys.argv[1])
+except FractalContactError as error:
+    print(error)
+for path in sys.argv[2:]:
     for name, read in readers.items():
         try:
             read(path)
@@ -176,32 +180,29 @@ for path in sys.argv[1:]:
 
 
 def test_pipes_and_devices_are_refused_at_once(tmp_path):
-    """In a process of its own, which is stopped if it waits for one of them; it prints the others."""
+    """In a process of its own, which is stopped if it waits for one of them; it prints the others.
+
+    Also by the name that a scene has for one.
+    """
     for name in ("pipe.npy", "pipe.nc", "pipe.png", "pipe.xyz"):
         os.mkfifo(tmp_path / name)
     for name, target in (("zero.npy", "/dev/zero"), ("zero.nc", "/dev/zero"), ("link.npy", "/dev/stdin")):
         (tmp_path / name).symlink_to(target)
     paths = [str(path) for path in sorted(tmp_path.iterdir())]
     assert len(paths) == 7
+    scene = tmp_path / "scene.toml"
+    text = '[surface]\nread = "pipe.npy"\nspacing = 1e-4\n[want]\nsurfaces = ["describe"]\n'
+    scene.write_text(text, encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-c", CODE, *paths],
+        [sys.executable, "-c", CODE, str(scene), *paths],
         timeout=120,
         check=False,
         capture_output=True,
         text=True,
         stdin=subprocess.PIPE,
     )
-    assert (done.returncode, done.stderr, done.stdout.split()) == (0, "", paths)
-
-
-def test_scene_that_reads_a_pipe_is_refused_at_once(tmp_path):
-    os.mkfifo(tmp_path / "scan.npy")
-    text = '[surface]\nread = "scan.npy"\nspacing = 1e-4\n[want]\nsurfaces = ["describe"]\n'
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    code = "import sys, fractalcontact as fc\nfc.scenes.validate(sys.argv[1])"
-    words = [sys.executable, "-c", code, str(tmp_path / "scene.toml")]
-    done = subprocess.run(words, timeout=120, check=False, capture_output=True, text=True)
-    assert "expected an existing file, got 'scan.npy'" in done.stderr
+    assert (done.returncode, done.stderr, done.stdout.split()[-7:]) == (0, "", paths)
+    assert "expected an existing file, got 'pipe.npy'" in done.stdout  # of the scene
 
 
 def test_archive_that_states_more_than_it_has_is_refused(tmp_path):
@@ -210,7 +211,7 @@ def test_archive_that_states_more_than_it_has_is_refused(tmp_path):
     header = io.BytesIO()
     zeros = np.broadcast_to(0.0, (1 << 13, 1 << 13))
     np.lib.format.write_array(header, zeros)
-    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("heights.npy", header.getvalue())
     with pytest.raises(UnreadableFile, match="at most 256 MiB when unpacked, for its size, got 512 MiB"):
         fc.surfaces.read(tmp_path / "bomb.npz", spacing=1.0)

@@ -53,7 +53,7 @@ def test_damaged_scenes_for_an_hour(data):
     check(lambda options: data.draw(strategies.sampled_from(options)))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_random_scenes(seed):
     stream = random.Random(seed)
     for _ in range(40):

@@ -18,7 +18,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+SLOW = ("one step without the dim", "one shear")  # two cases in one: "one of each" has neither dim
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(case, marks=pytest.mark.slow if case in SLOW else []) for case in CASES]
+)
 def test_parts_of_a_study(study, case):
     for path, drawing in (
         ("joints/closure", plotting.closure_laws),

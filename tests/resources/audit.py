@@ -142,8 +142,9 @@ REQUIREMENTS = {
     "partial_slip": _SOLVER,
     "joints/transmissivity": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "joints/uplift": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
-    "domains/box_dimension": Requirement(_SPECIAL, ("minimum cover", "mean cover", "islands")),
-    "domains/box_counts": Requirement(_SPECIAL, ("mean cover",)),
+    "domains/box_dimension": Requirement(_LABELS, ("minimum cover", "mean cover", "islands")),
+    # in the module of the box dimension, which labels islands
+    "domains/box_counts": Requirement(_LABELS, ("mean cover",)),
     "domains/box_counts/minimum": Requirement((), ("minimum cover",)),
     "domains/minkowski_dimension": Requirement(_SPECIAL, ("distances",)),
     "domains/correlation_dimension": Requirement((FFT, *_SPECIAL)),
