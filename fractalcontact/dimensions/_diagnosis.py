@@ -89,9 +89,9 @@ def unevenness(heights: Array) -> float:
     steps = [_PARTS if count else 1 for count in counts]
     ny, nx = (max(count, 1) for count in counts)
     parts = squares[: ny * edges[0], : nx * edges[1]].reshape(ny, edges[0], nx, edges[1])
-    with np.errstate(invalid="ignore"):
-        means = np.nanmean(parts, axis=(1, 3)) if np.isfinite(parts).any(axis=(1, 3)).all() else None
-    if means is None or not means.min() >= 0.0 or means.mean() == 0.0:
+    number = np.count_nonzero(np.isfinite(parts), axis=(1, 3))
+    means = np.nansum(parts, axis=(1, 3)) / np.maximum(number, 1)
+    if number.min() == 0 or means.mean() == 0.0:
         return 1.0
     blocks = means.reshape(ny // steps[0], steps[0], nx // steps[1], steps[1])
     within = float(np.mean(blocks.var(axis=(1, 3), ddof=1)))
@@ -106,7 +106,8 @@ def _squared_bends(heights: Array) -> Array:
     """
     if heights.shape[0] == 1:
         return np.square(np.diff(heights, 2, axis=1))
-    return np.square(np.diff(np.diff(heights, axis=0), axis=1))
+    bends = np.diff(np.diff(heights, axis=0), axis=1)
+    return np.square(bends, out=bends)
 
 
 def _spikes(heights: Array) -> str:

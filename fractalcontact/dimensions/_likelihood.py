@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.units import quantity_text
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_step, unevenness
 from fractalcontact.dimensions._filled_modes import fill, filling_ratio
@@ -222,14 +223,8 @@ def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[
     torus = Lattice(lattice.shape, lattice.spacing, True)
     if lattice.axes == 2 and not lattice.periodic:  # offsets of rows and columns are in none of the modes
         heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
-    tapers = [np.ones(1) if n == 1 else np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in lattice.shape]
-    if lattice.periodic:
-        tapers = [np.ones(n) for n in lattice.shape]
-    power = (
-        torus.power(heights * tapers[0][:, None] * tapers[1])
-        / np.mean(tapers[0] ** 2)
-        / np.mean(tapers[1] ** 2)
-    )
+    tapers = [window_weights(n, None if n == 1 or lattice.periodic else "hann") for n in lattice.shape]
+    power = torus.power(heights * (tapers[0][:, None] * tapers[1]))
     pilot = torus.q ** (-1.0 - torus.axes)
     inside = power > _EMPTY * float(np.max(power / pilot)) * pilot
     keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)

@@ -69,7 +69,8 @@ def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array
     for octave, places in enumerate(_Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE).places):
         values = ratio.ravel()[places[places >= 0]]
         factor[octave] = lattice.median / max(float(np.median(values)), 1e-300)
-    ratio *= factor[number]
+    for row, octaves in zip(ratio, number, strict=True):  # no second array of the size of the surface
+        row *= factor[octaves]
     return ratio
 
 

@@ -215,12 +215,15 @@ def find_waves(surface: Surface) -> list[Wave]:
     crop = tuple(slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for n in shape)
     is_part = max(shape) > LARGEST_CROP
     is_periodic = all(surface.grid.periodic) and not is_part
+    part = without_trend(surface.heights[crop], plane=not is_periodic)
+    search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
+    peaks = search.peaks(part)
+    if not peaks:
+        return []
     rest = without_trend(surface.heights, plane=not is_periodic)
     part = rest[crop]  # a view: it changes with the rest
-    search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
     found: list[Wave] = []
     for _ in range(_ROUNDS):
-        peaks = search.peaks(part)
         for at, p_value in peaks:
             # what a wave has left of itself: it is fitted again
             again = [wave for wave in found if _is_beside(at, wave.cycles, part.shape)]
@@ -235,6 +238,7 @@ def find_waves(surface: Surface) -> list[Wave]:
             found.append(wave)
         if len(found) > MOST and len(_sets(found, shape)) > MOST:
             return []
+        peaks = search.peaks(part)
         if not peaks:
             break
     return sorted(found, key=lambda wave: -wave.amplitude)
