@@ -5,6 +5,7 @@ No other module forks, changes the table of imported modules, or sets the garbag
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import sys
@@ -63,9 +64,11 @@ def collect_rarely() -> None:
     """Let Python look for cycles of unreachable objects once for 50 000 new ones, not once for 700.
 
     Only for the command line, whose process ends with its study. Measured for the shipped study: imports 1.27
-    -> 1.02 s of processor time, figures 2.9 -> 2.5 s, for 13 MB more in a process that draws all of them.
+    -> 1.02 s of processor time, figures 2.9 -> 2.5 s, for 13 MB more in a process that draws all of them. At
+    its end the memory goes back as a whole, not object by object: .7 -> .1 s.
     """
     gc.set_threshold(50_000)
+    atexit.register(gc.freeze)
 
 
 def calls_in_two_processes(function: Callable[[int], R], count: int) -> Iterator[tuple[int, R]]:
