@@ -427,8 +427,8 @@ def _is_beside(cycles: Array, other: Array, shape: tuple[int, ...], apart: float
 
 
 def _mean_square_increment(heights: Array) -> float:
-    steps = np.diff(heights, axis=1)
-    return float(np.mean(steps * steps))
+    """Return the sum of the mean square increments along both axes."""
+    return sum(float(np.mean(np.diff(heights, axis=k) ** 2)) for k in (0, 1) if heights.shape[k] > 1)
 
 
 def _dataset(surface: xr.DataArray, found: Sequence[Sequence[Wave]]) -> xr.Dataset:

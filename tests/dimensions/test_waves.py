@@ -357,6 +357,16 @@ def test_shortest_profile_gives_no_warning():
         assert fc.dimensions.waves(brownian((16,), 0.3 + 0.1 * (seed % 5), seed)).sizes["wave"] == 0
 
 
+def test_wave_along_one_axis_alone_is_the_surface():
+    """Its rows are constant: no increment along them may be divided by."""
+    wave = np.cos(2.0 * np.pi * 0.21 * np.arange(64))
+    for heights in (np.tile(wave[:, None], (1, 48)), np.tile(wave, (48, 1))):
+        found = fc.dimensions.waves(fc.surfaces.from_array(STEP * heights, SPACING))
+        assert found.wavelength.values[0] == pytest.approx(SPACING / 0.21, rel=1e-3)
+        result = fc.dimensions.estimate(fc.surfaces.from_array(STEP * heights, SPACING))
+        assert str(result.reason.values[0]) or np.isfinite(float(result.ci_low[0]))
+
+
 def test_sum_of_waves_is_left_alone():
     surface = fc.surfaces.weierstrass((1024,), SPACING, hurst=0.5, rms_height=STEP)
     assert "removed" not in str(fc.dimensions.estimate(surface).note.values)
