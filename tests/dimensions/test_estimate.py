@@ -1,5 +1,7 @@
 """Estimates of the Hurst exponent: names, labels, families, limits, errors, invariances."""
 
+import functools
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -26,6 +28,12 @@ def estimate(*arguments, **options):
 @pytest.fixture(scope="module")
 def rough():
     return fc.surfaces.fbm((96, 80), 1e-4, hurst=0.7, rms_increment=2e-6, rng=21)
+
+
+@pytest.fixture(scope="module")
+def of_rough(rough):
+    """Return a function: the estimate by some methods, made once."""
+    return functools.cache(lambda *methods: estimate(rough, list(methods)))
 
 
 def estimate_one(surface, method=None, **options):
@@ -72,8 +80,8 @@ def test_every_method(rough, tmp_path):
     xr.testing.assert_identical(fc.open(fc.save(result, tmp_path / "result.nc")), result)
 
 
-def test_increment_and_topothesy(rough):
-    result = estimate(rough, VALIDATED)
+def test_increment_and_topothesy(of_rough):
+    result = of_rough(*VALIDATED)
     np.testing.assert_allclose(result.rms_increment, 2e-6, rtol=0.05)
     exact = 1e-4 * (2e-6 / 1e-4) ** (1 / (1 - result.hurst))
     np.testing.assert_allclose(
@@ -113,8 +121,8 @@ def test_crop_of_band_limited_surface_holds_exponent():
     assert float(result.ci_low) < 0.8 < float(result.ci_high)
 
 
-def test_gaps_cause_no_bias(rough):
-    result, complete = estimate(with_gaps(rough), VALIDATED), estimate(rough, VALIDATED)
+def test_gaps_cause_no_bias(rough, of_rough):
+    result, complete = estimate(with_gaps(rough), VALIDATED), of_rough(*VALIDATED)
     np.testing.assert_allclose(result.hurst, complete.hurst, atol=0.03)
     assert float(result.standard_error[1]) > float(complete.standard_error[1])
     np.testing.assert_allclose(result.standard_error, complete.standard_error, rtol=0.5)
@@ -154,8 +162,8 @@ def test_unequal_spacings_and_transposed():
 
 
 @pytest.mark.parametrize("name", SCALE_FREE)
-def test_powers_of_two_change_no_bit(rough, name):
-    result, tiny = estimate(rough, name), estimate(rough * 2.0**-40, name)
+def test_powers_of_two_change_no_bit(rough, of_rough, name):
+    result, tiny = of_rough(name), estimate(rough * 2.0**-40, name)
     for key in ("hurst", "standard_error", "ci_low", "ci_high", "misfit"):
         np.testing.assert_array_equal(result[key], tiny[key])
     np.testing.assert_array_equal(result.rms_increment * 2.0**-40, tiny.rms_increment)
@@ -165,9 +173,9 @@ def test_powers_of_two_change_no_bit(rough, name):
 
 
 @pytest.mark.parametrize("factor", [1e-9, 1e6])
-def test_any_unit_of_height(rough, factor):
+def test_any_unit_of_height(rough, of_rough, factor):
     np.testing.assert_allclose(
-        estimate(rough * factor, SCALE_FREE).hurst, estimate(rough, SCALE_FREE).hurst, rtol=1e-7
+        estimate(rough * factor, SCALE_FREE).hurst, of_rough(*SCALE_FREE).hurst, rtol=1e-7
     )
 
 
@@ -192,12 +200,12 @@ def test_threads_change_no_bit(rough):
         np.testing.assert_array_equal(result[0][key], result[1][key])
 
 
-def test_scales_limit_the_fit(rough):
+def test_scales_limit_the_fit(rough, of_rough):
     window = (4e-4, 3.2e-3)
     result = estimate(rough, NAMES, scales=window)
     assert (result.scale_min >= window[0] * (1 - 1e-9)).all()
     assert (result.scale_max <= window[1] * (1 + 1e-9)).all()
-    free = estimate(rough, ["likelihood"])
+    free = of_rough("likelihood")
     assert float(result.standard_error[0]) > 1.5 * float(free.standard_error[0])
     assert float(result.ci_low[0]) < 0.7 < float(result.ci_high[0])
     with pytest.raises(InvalidInput, match="scales: expected a window that meets the lengths of the surface"):
@@ -333,11 +341,11 @@ def test_invalid_arguments(rough):
 
 
 @pytest.mark.parametrize("factor", [2.0**530, 2.0**-530])
-def test_heights_whose_squares_overflow(rough, factor):
+def test_heights_whose_squares_overflow(rough, of_rough, factor):
     """Exponents are dimensionless; the curves, in m2 and m4, raise an error."""
     far = rough.copy(data=rough.values * factor)
     unitless = SCALE_FREE
-    here, there = estimate(rough, unitless), estimate(far, unitless)
+    here, there = of_rough(*unitless), estimate(far, unitless)
     np.testing.assert_array_equal(here.hurst, there.hurst)
     np.testing.assert_array_equal(here.rms_increment * factor, there.rms_increment)
     assert np.isfinite(estimate(far, ["covering", "divider"]).hurst).all()

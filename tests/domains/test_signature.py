@@ -117,7 +117,7 @@ def test_groups_of_spots_cluster():
     assert float(result.pair_correlation_length) > 7.5
 
 
-@pytest.mark.parametrize("keep", [0.5, 0.6, 0.7])
+@pytest.mark.parametrize("keep", [0.5, pytest.param(0.6, marks=pytest.mark.slow), 0.7])
 def test_cascades_have_their_dimension(keep):
     """Over 8 to 32 cells of a cascade from 4 to 256: the mean cover is biased upwards by spots and gaps."""
     planes = np.array([cascades(seed, [keep], finest=4)[0] for seed in range(6)])

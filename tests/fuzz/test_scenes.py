@@ -19,7 +19,7 @@ from hypothesis import given, settings, strategies
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
 
-QUICK, LONG = 80, 20_000
+QUICK, LONG = 60, 20_000
 
 
 def fault(source):

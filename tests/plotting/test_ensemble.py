@@ -61,8 +61,10 @@ def study(factors):
     return xr.DataTree.from_dict({"contact": pressed})
 
 
-def test_curves_are_the_median_and_bands_the_quantiles(drawn):
-    curves, bands, words = drawn(study(FACTORS))["contact_area"]
+def test_curves_are_the_median_bands_the_quantiles_and_maps_name_their_member(drawn):
+    figures = drawn(study(FACTORS))
+    assert figures["contact_domains"][2] == "member 0 of 5"
+    curves, bands, words = figures["contact_area"]
     assert words == "curves: median, band: central 68 % of 5 members"
     cells = next(curve for curve in curves if curve[-1, 1] == pytest.approx(100 * 0.03 * 0.4))
     np.testing.assert_allclose(cells[:, 1], 100 * 0.03 * FORCES / 10)
@@ -79,10 +81,6 @@ def test_band_has_the_unit_of_the_axis(drawn):
     shown = next(curve for curve in curves if len(curve) == 3)[0, 0]
     assert bands[0][0, 0] / shown == pytest.approx(low / middle)
     assert bands[0][-2, 0] / shown == pytest.approx(high / middle)
-
-
-def test_maps_name_their_member(drawn):
-    assert drawn(study(FACTORS))["contact_domains"][2] == "member 0 of 5"
 
 
 def test_single_study_has_neither_bands_nor_words(drawn):
