@@ -98,10 +98,11 @@ def test_wrong_arguments_are_all_named():
         assert word in str(caught.value)
 
 
+@pytest.mark.parametrize("members", [8, pytest.param(12, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("family", "n"), [("crop", 48), ("profile", 256)])
-def test_blurred_and_noisy_members_of_a_family(family, n):
+def test_blurred_and_noisy_members_of_a_family(family, n, members):
     """Blur of a whole spacing is in the model: the interval is that of the longer waves."""
-    options = {"methods": "likelihood", "members": 12, "noise": 0.02, "rng": 3}
+    options = {"methods": "likelihood", "members": members, "noise": 0.02, "rng": 3}
     sharp, wide = (fc.accuracy.estimators(0.5, n, family, blur=b, **options).squeeze() for b in (0.0, 1.0))
     assert wide["least_error"] > 1.5 * sharp["least_error"]
     assert abs(sharp["bias"]) < 0.1

@@ -373,7 +373,7 @@ def test_directions_of_a_surface_of_which_little_was_observed(seed):
 @pytest.mark.parametrize(
     ("points", "hurst", "missing", "scales"),
     [
-        (40, 0.2, 0.0, None),
+        pytest.param(40, 0.2, 0.0, None, marks=pytest.mark.slow),
         pytest.param(40, 0.8, 0.0, None, marks=pytest.mark.slow),
         (40, 0.2, 0.2, None),
         (160, 0.6, 0.0, (3.4e-3, 1.4e-2)),

@@ -16,7 +16,6 @@ from fractalcontact.base.errors import InvalidInput
 
 WRONG = ("object", "minus infinity", "word", "list of dicts")
 WRONG_IN_SCENES = (-1, "wrong word", [], {"a": 1})
-SHARE = 16  # of the pairs of a scene one in so many
 
 
 def problems_of(call):
@@ -73,8 +72,10 @@ def changed(tables, place, value):
     return tables | {key: changed(tables[key], rest, value) if rest else value}
 
 
+@pytest.mark.parametrize("share", [32, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SCENES)
-def test_two_wrong_values_of_a_scene_are_both_named(tmp_path, name):
+def test_two_wrong_values_of_a_scene_are_both_named(tmp_path, name, share):
+    """Of the pairs of a scene one in so many; all values are tried alone."""
     np.save(tmp_path / "scan.npy", rough().values * 1e6)
 
     def problems(tables):
@@ -89,7 +90,7 @@ def test_two_wrong_values_of_a_scene_are_both_named(tmp_path, name):
                 break
     pairs = [(first, second) for n, first in enumerate(alone) for second in list(alone)[n + 1 :]]
     hidden = []
-    for first, second in pairs[::SHARE]:
+    for first, second in pairs[::share]:
         both = changed(changed(SCENES[name], first, alone[first]), second, alone[second])
         lines = problems(both)
         if not (names(lines, first[-1]) and names(lines, second[-1])):

@@ -176,16 +176,25 @@ def test_surface_read_from_a_file_is_not_kept_again(uninterrupted, tmp_path, mon
     assert not [name for name in part_names if name.startswith("surfaces")]
 
 
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A study of two stages beside the surface: its scene, and its variables."""
+    folder = tmp_path_factory.mktemp("small")
+    (folder / "study.toml").write_text(SOUND, encoding="utf-8")
+    fc.scenes.run(folder / "study.toml", out=folder, progress=False)
+    return folder / "study.toml", variables(folder / "result.nc")
+
+
 @pytest.mark.parametrize("how", ["truncated", "foreign", "NetCDF", "flipped bit", "text"])
-def test_damaged_part_is_reported_and_computed_again(uninterrupted, tmp_path, monkeypatch, how):
+def test_damaged_part_is_reported_and_computed_again(small, tmp_path, monkeypatch, how):
     with monkeypatch.context() as patch:
         watch_calls(patch, lambda name: signal.raise_signal(signal.SIGINT))
         with pytest.raises(Stopped):
-            fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
+            fc.scenes.run(small[0], out=tmp_path, progress=False)
     damaged(tmp_path, how)
     with pytest.warns(FractalContactWarning, match="computed again"):
-        fc.scenes.run(uninterrupted[0], out=tmp_path, progress=False)
-    assert variables(tmp_path / "result.nc") == uninterrupted[1]
+        fc.scenes.run(small[0], out=tmp_path, progress=False)
+    assert variables(tmp_path / "result.nc") == small[1]
 
 
 @pytest.mark.parametrize("cut", [0, 10, 1000, -1])

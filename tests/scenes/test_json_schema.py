@@ -82,7 +82,13 @@ def test_shipped_scenes_fit_and_name_the_schema(name):
     VALIDATOR.validate(tomllib.loads(text))
 
 
-@pytest.mark.parametrize("name", ["rigid_sliding", "pressed_surface", "new_scene"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "new_scene",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("rigid_sliding", "pressed_surface")),
+    ],
+)
 def test_what_the_schema_refuses_is_refused_by_load(name, tmp_path):
     tables = scene(name)
     assert is_loaded(tables, tmp_path)
