@@ -193,7 +193,7 @@ def solve_path(path: ScaledPath, guess: Callable[[float], Array | None] | None =
     for value in path.values:
         start = perf_counter()
         control = scaled_control(path, value, history.first_touch)
-        solution = closed_form(problem, control)
+        solution = closed_form(problem, control, path.tolerance)
         if solution is None:
             solver = solver or make_solver(problem, path)
             solution = solver.solve(control, None if guess is None else guess(value))
@@ -210,7 +210,7 @@ def solve_path(path: ScaledPath, guess: Callable[[float], Array | None] | None =
             history = step.history_after
             problem = replace(problem, gap=path.gap + history.indentation - history.first_touch)
             if solver is not None:  # only the fast method has a hardness, see `ContactOptions`
-                cast("WindowSolver", solver).lower_surface(problem.gap)
+                cast("WindowSolver", solver).set_gap(problem.gap)
 
 
 def scaled_control(path: ScaledPath, value: float, first_touch: float) -> Control:
@@ -232,16 +232,16 @@ def make_solver(problem: Problem, path: ScaledPath) -> WindowSolver | Eliminatio
     return WindowSolver(problem, path.tolerance)
 
 
-def closed_form(problem: Problem, control: Control) -> Solution | None:
+def closed_form(problem: Problem, control: Control, tolerance: float) -> Solution | None:
     """Return the solution where there is a closed form: no load, a flat surface, beyond full contact."""
     if control.value <= 0:
         zero = np.zeros(problem.body.shape)
-        return Solution(zero, zero, control.closure or 0.0, 0.0)
+        return Solution(zero, zero, control.closure or 0.0, 0.0, reason="converged")
     elastic = problem.body.periodic and problem.p_max == np.inf
     if elastic and control.closure is not None and control.value >= mean_by_rows(problem.gap):
         return beyond_full_contact(problem, control.value)
     if not problem.gap.any():
-        return flat_contact(problem, control)
+        return flat_contact(problem, control, tolerance)
     return None
 
 
@@ -253,7 +253,7 @@ def beyond_full_contact(problem: Problem, closure: float) -> Solution:
     )
 
 
-def flat_contact(problem: Problem, control: Control) -> Solution | None:
+def flat_contact(problem: Problem, control: Control, tolerance: float) -> Solution | None:
     """Return the solution of a flat surface: closure = force / stiffness, as `flat_stiffness` has it.
 
     None where some nodes yield and others do not.
@@ -266,7 +266,7 @@ def flat_contact(problem: Problem, control: Control) -> Solution | None:
         # closure at 0
         pressure = np.full(problem.body.shape, min(force / problem.gap.size, problem.p_max))
         force = float(pressure[0, 0]) * problem.gap.size
-        return Solution(pressure, block.displacement, control.closure or 0.0, force)
+        return Solution(pressure, block.displacement, control.closure or 0.0, force, reason="converged")
     if block.pressure.max() * force > problem.p_max:
         return None
     return Solution(
@@ -277,6 +277,7 @@ def flat_contact(problem: Problem, control: Control) -> Solution | None:
         block.iterations,
         block.transforms,
         block.residual,
+        reason="converged" if block.residual <= tolerance else "rounding",
         work=block.compliance * force * force,
     )
 

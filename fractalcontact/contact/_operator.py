@@ -66,7 +66,7 @@ class PeriodicOperator:
         return self.multiplier.plane(out)
 
 
-class FreeOperator:
+class HalfSpaceOperator:
     """Half-space loaded inside a window: convolution on a plane padded so that nothing wraps around."""
 
     def __init__(self, table: Array, dtype: Any = np.float64) -> None:
@@ -80,7 +80,7 @@ class FreeOperator:
         self.latest: Array | None = None  # displacement that came with the work on a small plane
         self.transforms = 0.0
 
-    def rounded(self, dtype: Any) -> FreeOperator:
+    def rounded(self, dtype: Any) -> HalfSpaceOperator:
         """Return the same operator in another precision, or in the same one with arrays of its own."""
         other = copy(self)
         other.symbol = self.symbol.astype(dtype, copy=False)

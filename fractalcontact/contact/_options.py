@@ -50,7 +50,8 @@ class ContactOptions:
     ----------
     boundary : {None, "periodic", "free"}
         None: periodic where both axes of the surface are periodic. A periodic surface may be declared free,
-        never the reverse.
+        never the reverse. Free: a half-space that continues, plane and without traction, around the surface;
+        it has no side faces.
     influence : {None, "disc", "square", "spectral"}
         Influence coefficients, see `press`. None: "spectral" for periodic bodies, "disc" for free ones.
     disc_radius : {"second_order", "inscribed", "equal_area"}
@@ -67,7 +68,7 @@ class ContactOptions:
     influence: str | None = None
     disc_radius: str = "second_order"
     hardness: float | None = None
-    tolerance: float = 1e-8
+    tolerance: float = 1e-8  # from 1e-5 on the area is that of the solution (page theory_contact)
     method: str = "fast"
 
     def __post_init__(self) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact import _influence
-from fractalcontact.contact._operator import SMALL, FreeOperator, Operator, PeriodicOperator
+from fractalcontact.contact._operator import SMALL, HalfSpaceOperator, Operator, PeriodicOperator
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Body:
             return PeriodicOperator(self.shape, self.spacing)
         if self.is_small:
             return kept_operator(self).rounded(dtype)
-        return FreeOperator(self.influence_table(), dtype)
+        return HalfSpaceOperator(self.influence_table(), dtype)
 
 
 @dataclass(frozen=True)
@@ -116,14 +116,14 @@ class Solution:
     iterations: int = 0
     transforms: int = 0
     residual: float = 0.0
-    reason: str = "converged"
+    reason: str = ""  # why the solution stopped, a key of `STOP_REASONS`
     work: float = 0.0  # sum of pressure times displacement: twice the elastic energy
 
 
 @lru_cache(maxsize=16)
-def kept_operator(body: Body) -> FreeOperator:
+def kept_operator(body: Body) -> HalfSpaceOperator:
     """Return the operator of a small free body; its table takes as long as a solution."""
-    return FreeOperator(body.influence_table())
+    return HalfSpaceOperator(body.influence_table())
 
 
 def make_units(

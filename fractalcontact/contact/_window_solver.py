@@ -22,7 +22,7 @@ import numpy as np
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact._constrained_cg import ConstrainedCG
 from fractalcontact.contact._contact_system import ContactSystem
-from fractalcontact.contact._operator import FreeOperator, Operator, PairSum
+from fractalcontact.contact._operator import HalfSpaceOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
 from fractalcontact.contact._scaled_problem import Body, Control, Problem, Solution
 
@@ -89,7 +89,7 @@ class WindowSolver:
         self.past_steps = [*self.past_steps[-1:], past]
         return replace(solution, iterations=self.iterations, transforms=self.transforms)
 
-    def lower_surface(self, gap: Array) -> None:
+    def set_gap(self, gap: Array) -> None:
         """Go on with another gap, where yielded nodes have been lowered."""
         self.problem = replace(self.problem, gap=gap)
         self._sorted_gap, self._window = None, None
@@ -248,10 +248,14 @@ class WindowSolver:
         return plane
 
     def with_displacement(self, solution: Solution, pressure: Array) -> Solution:
-        """Return a solution with its pressure, and the displacement under it, on the whole extent."""
+        """Return a solution with its pressure, and the displacement under it, on the whole extent.
+
+        Nodes that were left out stay open: no influence coefficient is negative, so that the displacement
+        under pressure elsewhere only adds to their gap.
+        """
         if self._operator is None:
             tables, body = self._pair_tables, self.problem.body
-            self._operator = FreeOperator(tables[0]) if tables and not body.is_small else body.operator()
+            self._operator = HalfSpaceOperator(tables[0]) if tables and not body.is_small else body.operator()
         self.transforms += 1
         return replace(solution, pressure=pressure, displacement=self._operator.apply(pressure))
 
@@ -327,7 +331,7 @@ class WindowSolver:
         operator = None
         if dtype is np.float32 and not part.body.periodic:  # the kernel is computed once for both
             double = self.system(part, np.float64).operator
-            operator = double.rounded(dtype) if isinstance(double, FreeOperator) else None
+            operator = double.rounded(dtype) if isinstance(double, HalfSpaceOperator) else None
         system = ContactSystem.on_plane(part, dtype, self.problem.local_compliance, operator)
         if not part.body.periodic:
             self._systems[dtype] = system

@@ -61,7 +61,8 @@ def closure(
     """Return the closure of a sheared crack under a path of load.
 
     The delta-surface of every shear is pressed together along the same path. The closure w counts from first
-    touch at that shear; without its bulk part, w_int = w - w_b(F), it is 0 to rounding for mated faces.
+    touch at that shear. Without its bulk part, w_int = w - w_b(F), it is 0 to rounding for mated faces, where
+    `bulk` is "flat_block" and no node yields.
 
     Parameters
     ----------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -115,7 +117,8 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     Raises
     ------
     InvalidInput
-        `closure` is not the Dataset of `closure`, or the pressure is not positive.
+        `closure` is not the Dataset of `closure`, or the pressure is not positive. Steps that did not
+        converge are fitted, with a ConvergenceWarning.
 
     Notes
     -----
@@ -152,6 +155,9 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     seat = None if seating_pressure is None else float(seating_pressure)
     bulk = closure["bulk_closure"].values if "bulk_closure" in closure else np.zeros(1)
     rounding = ROUNDED_DIGITS * float(np.fmax.reduce(np.abs(bulk), axis=None))
+    if "converged" in closure and not closure["converged"].values.all():
+        message = "fractalcontact.joints.closure_laws: steps that did not converge are fitted like the others"
+        warnings.warn(message, ConvergenceWarning, stacklevel=4)
     fits, flags, stiffnesses, seated = [], [], [], []
     for w, p in zip(interface.values.reshape(-1, steps), pressure.values.reshape(-1, steps), strict=True):
         counted = w if seat is None else w - closure_at(seat, p, w)

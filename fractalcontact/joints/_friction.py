@@ -157,7 +157,7 @@ def friction(
     name, shears = _dilatancy_name(dilatancy), _shears(dilatancy)
     basic_angle = float(_basic_angle(dilatancy, basic_friction_angle))
     opening = drop_unknown_coords(dilatancy[name]).drop_attrs()
-    lift = opening.copy(data=lift_curve(dilatancy, form))
+    lift = opening.copy(data=work_per_force(dilatancy, form))
     result = xr.Dataset({"dilatancy_angle": _angle(opening, smoothing)})
     if form == "energy":
         result["frictionless_angle"] = _angle(lift, smoothing)
@@ -180,8 +180,8 @@ def friction(
     return result
 
 
-def lift_curve(dilatancy: xr.Dataset, form: str) -> Array:
-    """Return the curve (m) whose slope is the tangent of the angle at which the faces climb.
+def work_per_force(dilatancy: xr.Dataset, form: str) -> Array:
+    """Return the curve (m) whose slope is T/N, the tangent of the angle at which the faces climb.
 
     That is the dilatancy, or in the energy form the work of the horizontal force T of faces without friction
     per normal force N, since the first shear. From T dv = N dz + dU, with z the height of the upper body,
@@ -196,6 +196,7 @@ def lift_curve(dilatancy: xr.Dataset, form: str) -> Array:
         dilatancy[each].broadcast_like(opening).transpose(*opening.dims).values for each in ENERGIES
     )
     axis = opening.dims.index("shear")
+    # T/N = d delta/dv + (1/N) d(U - N w_b/2)/dv
     force, stored = np.moveaxis(force, axis, 0), np.moveaxis(energy - 0.5 * force * bulk, axis, 0)
     mean_force = 0.5 * (force[1:] + force[:-1])
     no_work = np.zeros_like(mean_force)  # faces that do not touch store nothing

@@ -188,7 +188,7 @@ class ShearedContact:
             )
         columns = pressed.columns | pressed.maps
         columns["rms_slope"] = np.array(self.rms_slope)
-        # the mean displacement of a periodic body is a rigid motion, whatever the force: no bulk part
+        # the mean displacement of a periodic body is a rigid motion: no bulk part, also for a force of NaN
         has_bulk = np.isfinite(pressing.block_stiffness)
         bulk = columns["normal_force"] / pressing.block_stiffness if has_bulk else 0.0 * columns["closure"]
         return columns | {"bulk_closure": bulk, "interface_closure": columns["closure"] - bulk}
@@ -383,4 +383,5 @@ def pressed_dataset(
     result = xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
     result["bulk_closure"].attrs["comment"] = BULK[pressing.bulk][1]
     residual = float(np.max(stacked["residual"]))
-    return result.assign_attrs(achieved_residual=residual, references=pressing.references)
+    stated = {"references": pressing.references, **pressing.options.stated_on(pressing.grid)}
+    return result.assign_attrs(stated, achieved_residual=residual)

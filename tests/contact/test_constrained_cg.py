@@ -207,3 +207,11 @@ def test_closure_near_mean_plane_is_full_contact(share):
     full = press(surface, nominal_pressure=1e10)
     assert float(result["normal_force"][0]) < float(full["normal_force"][0])
     assert float(result["contact_fraction"][0]) > 0.9
+
+
+def test_flat_surface_converges_only_to_the_tolerance_that_rounding_leaves():
+    flat = fc.surfaces.from_array(np.zeros((24, 24)), 1e-4)
+    load = {"normal_force": 1.0, "contact_modulus": 1e9}
+    assert fc.contact.press(flat, **load, tolerance=1e-12).converged.all()
+    with pytest.warns(ConvergenceWarning, match="step 0: rounding"):
+        assert not fc.contact.press(flat, **load, tolerance=1e-16).converged.any()

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from fractalcontact.contact import _influence as influence
-from fractalcontact.contact._operator import FreeOperator, PeriodicOperator
+from fractalcontact.contact._operator import HalfSpaceOperator, PeriodicOperator
 from fractalcontact.contact._scaled_problem import Body
 
 
@@ -115,7 +115,7 @@ def test_free_operator_matches_pair_sum(shape, kind):
             for i in range(shape[0])
         ]
     )
-    np.testing.assert_allclose(FreeOperator(table).apply(pressure), direct, rtol=1e-13)
+    np.testing.assert_allclose(HalfSpaceOperator(table).apply(pressure), direct, rtol=1e-13)
 
 
 @pytest.mark.parametrize("shape", [(8, 12), (9, 7), (31, 5)])

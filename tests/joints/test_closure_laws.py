@@ -5,6 +5,7 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
+from fractalcontact.base.errors import ConvergenceWarning
 
 
 def law(pressure, closure):
@@ -32,6 +33,13 @@ def test_hyperbolic_joint():
         assert result[name] == pytest.approx(value, rel=1e-6)
     assert result.hyperbolic_misfit < 1e-12
     assert result.exponential_misfit > 1e-6
+
+
+def test_steps_that_did_not_converge_are_named():
+    pressed = law(np.linspace(1e5, 1e6, 6), np.linspace(1e-6, 3e-6, 6))
+    fc.joints.closure_laws(pressed.assign(converged=("step", np.ones(6, dtype=bool))))
+    with pytest.warns(ConvergenceWarning, match="did not converge"):
+        fc.joints.closure_laws(pressed.assign(converged=("step", np.arange(6) != 2)))
 
 
 def test_straight_line_has_no_greatest_closure():
