@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the gri
 TILTED = 0.5  # of the mean square height that the mean plane carries: more, and a flat touches one edge
 SPIKED_DIMENSION, SPIKED_JRC, SPIKED_LIFT = 0.01, 0.5, 0.1  # changes by spikes that are worth a sentence:
 # half of the usual interval of D, a fortieth of the scale of JRC, a tenth of the opening at first touch
+Rule = Callable[[xr.DataTree], Iterator[str]]
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
 
 
@@ -45,17 +46,19 @@ def caveats(tree: xr.DataTree) -> list[str]:
     """
     if group_of(tree, OVERVIEW) is not None:  # of many scans: it has the caveats of each
         return []
-    lines = [*_no_interval(tree), *_spikes(tree), *_tilt(tree)]
-    pressed = {path: group_of(tree, path) for path in PRESSED}
-    known = {path: data for path, data in pressed.items() if data is not None and "contact_fraction" in data}
-    for path, data in known.items():
-        lines += _resolution(path, data)
-    for path, data in known.items():
-        lines += _true_pressure(path, data, _table(tree, "material"))
-    lines += _strength(tree)
-    for path, data in known.items():
-        lines += _slopes(path, data, PRESSED[path])
-    return [*lines, *_uplift(tree)]
+    return [sentence for rule in RULES for sentence in rule(tree)]
+
+
+def _of_contacts(rule: Callable[[xr.DataTree, str, xr.Dataset], Iterator[str]]) -> Rule:
+    """Return the rule for every contact of a study, from that for one group of results."""
+
+    def of_all(tree: xr.DataTree) -> Iterator[str]:
+        for path in PRESSED:
+            data = group_of(tree, path)
+            if data is not None and "contact_fraction" in data:
+                yield from rule(tree, path, data)
+
+    return of_all
 
 
 def _no_interval(tree: xr.DataTree) -> Iterator[str]:
@@ -166,7 +169,9 @@ def _median_cells(mask: Array) -> float:
     return float(np.median(np.bincount(labels.ravel())[1:])) if count else float("nan")
 
 
-def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
+@_of_contacts
+def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
+    """Yield at how many loads the contacts have too few cells, and what the grid does to their areas."""
     cells = _cells_per_island(pressed)
     others = [dim for dim in cells.dims if dim != "step"]
     low, high = (np.atleast_1d(getattr(cells, end)(others).values) for end in ("min", "max"))
@@ -190,12 +195,14 @@ def _resolution(path: str, pressed: xr.Dataset) -> Iterator[str]:
     )
 
 
-def _true_pressure(path: str, pressed: xr.Dataset, material: dict[str, Any]) -> Iterator[str]:
+@_of_contacts
+def _true_pressure(tree: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
+    """Yield that true pressures are beyond the one at which the material yields."""
     if "plastic_work" in pressed:  # a hardness limits the pressure
         return
     true = pressed["nominal_pressure"] / pressed["contact_fraction"].where(pressed["contact_fraction"] > 0)
     low, high = (f"{float(end) / 1e9:.2g}" for end in (true.min(), true.max()))
-    limits = material.get("yield_pressure")
+    limits = _table(tree, "material").get("yield_pressure")
     if limits is not None and float(true.max()) > np.min(limits):
         span = " to ".join(f"{float(limit) / 1e9:.2g}" for limit in np.atleast_1d(limits))
         factor = float(true.max()) / float(np.max(limits))
@@ -206,18 +213,21 @@ def _true_pressure(path: str, pressed: xr.Dataset, material: dict[str, Any]) -> 
         )
 
 
-def _slopes(path: str, pressed: xr.Dataset, surface: str) -> Iterator[str]:
+@_of_contacts
+def _slopes(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
+    """Yield that slopes are beyond small strains."""
     if "rms_slope" not in pressed:
         return
     slope = float(pressed["rms_slope"].max())
     if slope > STEEP:
         yield (
-            f"{path}: {surface} has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are not "
-            "small, and the closures and areas of linear elasticity are approximations."
+            f"{path}: {PRESSED[path]} has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are "
+            "not small, and the closures and areas of linear elasticity are approximations."
         )
 
 
 def _strength(tree: xr.DataTree) -> Iterator[str]:
+    """Yield that the peak strength is beyond the pressure at which the material yields."""
     friction = group_of(tree, "joints/friction")
     limits = _table(tree, "material").get("yield_pressure")
     if friction is None or limits is None or "peak_shear_strength" not in friction:
@@ -233,6 +243,7 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
 
 
 def _uplift(tree: xr.DataTree) -> Iterator[str]:
+    """Yield where diagrams are unsafe, water is closed off, or no balance was found."""
     water = group_of(tree, "joints/uplift")
     if water is None:
         return
@@ -276,3 +287,9 @@ def _table(tree: xr.DataTree, name: str) -> dict[str, Any]:
     """Return a table of the scene of a study, empty where there is none."""
     table = scene_of(tree).get(name)
     return table if isinstance(table, dict) else {}
+
+
+# the most important first
+RULES: tuple[Rule, ...] = (
+    _no_interval, _spikes, _tilt, _resolution, _true_pressure, _strength, _slopes, _uplift,
+)  # fmt: skip

@@ -10,13 +10,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._options import values_of
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stage_memory import stage_memory
-from fractalcontact.scenes._stages import (
-    FIGURES,
-    ISLAND_MAP,
-    STAGES,
-    Stage,
-    StageType,
-)
+from fractalcontact.scenes._stages import FIGURES, ISLAND_MAP, STAGES, Stage, StageType
 
 WITH_MEMORY = 80  # characters of a screen that holds the table with its column of memory
 

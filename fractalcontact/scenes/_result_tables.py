@@ -25,20 +25,8 @@ WIDE_COLUMN = 1e3  # greatest ratio of the values of a column with one unit
 ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 FRACTIONS = ("contact_fraction", "corrected_contact_fraction", "stick_fraction", "coverage", "largest_share")
 PATHS = ("shear", "step", "nominal_pressure")  # a table without rows along one shows its last value
-# head of the first columns of a table, by dim
-KEYS = {
-    SCAN: "scan",
-    "shear": "shear",
-    "direction": "toward",
-    "method": "method",
-    "nominal_pressure": "nominal pressure",
-    "structure_size": "size of the structure",
-    "resolution": "spacing",
-    "criterion": "criterion",
-    "axis": "along",
-    "moment_order": "order",
-    "diagram": "diagram",
-}
+# head of the first column of a table, by the dim of its rows, where it is not the name of the dim
+KEYS = {"direction": "toward", "structure_size": "size of the structure", "resolution": "spacing"}
 
 
 @dataclass(frozen=True)
@@ -154,7 +142,7 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = 
     key_heads, key_cells = [], []
     for dim in keys:
         values = [_key(dim, state, data, rows) for state in states]
-        key_heads.append(rows.load.replace("_", " ") if dim == "step" else KEYS[dim])
+        key_heads.append(KEYS.get(dim, (rows.load if dim == "step" else dim).replace("_", " ")))
         key_cells.append(values)
     if {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads:
         pressures = finite(data["nominal_pressure"])

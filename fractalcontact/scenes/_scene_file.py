@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tomllib
+from collections.abc import Sequence
 from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from fractalcontact.scenes._options import FROM_MATERIAL, given_options, loads_o
 from fractalcontact.scenes._plan import stages_of
 from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, Scene, Table
 from fractalcontact.scenes._scene_keys import Keys
-from fractalcontact.scenes._stages import STAGES
+from fractalcontact.scenes._stages import STAGES, Stage, StageType
 
 LARGEST_FILE = 1 << 20  # bytes
 LONGEST_KEY = 32  # parts of a dotted key; the time and the memory of the parser grow with their square
@@ -224,8 +225,11 @@ def _check(scene: Scene, problems: Problems) -> None:
     if not scene.table("want"):
         problems.add("want", "a table that names at least one result", NONE)
     if not any(argument.startswith("want") for argument in problems.arguments):
-        _check_needed_tables(scene, problems)
-        _check_needs(scene, problems)
+        stages = stages_of(scene)
+        _check_material(scene, [stage.row for stage in stages if stage.row.presses], problems)
+        for stage in stages:
+            if stage.row.table and stage.row.takes != "file":
+                _check_arguments(scene, stage, problems)
 
 
 def _check_surface(table: Table, name: str, problems: Problems) -> None:
@@ -262,11 +266,10 @@ def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> Non
         problems.require(key in table, f"{name}.{key}", f"a value for {source}", NONE)
 
 
-def _check_needed_tables(scene: Scene, problems: Problems) -> None:
-    """Check that the material and the load are there where a wanted result needs them."""
+def _check_material(scene: Scene, pressing: Sequence[StageType], problems: Problems) -> None:
+    """Check that the material has the constants of the stages that press, and none that they refuse."""
     material = scene.table("material")
     is_elastic = bool({"young", "poisson"} & set(material))
-    pressing = [stage.row for stage in stages_of(scene) if stage.row.presses]
     if any(row.takes == "crack" and (is_elastic or not row.may_be_rigid) for row in pressing):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
@@ -275,30 +278,26 @@ def _check_needed_tables(scene: Scene, problems: Problems) -> None:
         problems.require("hardness" not in material, "material.hardness", expected, "a value")
 
 
-def _check_needs(scene: Scene, problems: Problems) -> None:
+def _check_arguments(scene: Scene, stage: Stage, problems: Problems) -> None:
     """Note what a stage needs and the scene does not give, and loads and directions that are ambiguous."""
-    material = set(scene.table("material"))
-    for stage in stages_of(scene):
-        row, name, reason = stage.row, stage.row.word or stage.name, stage.reason
-        if not row.table or row.takes == "file":
+    row, name, reason = stage.row, stage.row.word or stage.name, stage.reason
+    options, material = given_options(scene, row), set(scene.table("material"))
+    for key in row.needed():
+        sources, _ = FROM_MATERIAL.get(key, ((), None))
+        if key in options or (sources and material >= set(sources)):
             continue
-        options = given_options(scene, row)
-        for key in row.needed():
-            sources, _ = FROM_MATERIAL.get(key, ((), None))
-            if key in options or (sources and material >= set(sources)):
-                continue
-            place = "joint" if key in (*LOADS, "shear", "block") else row.table
-            if key.endswith("friction_angle"):
-                place, key, sources = "material", "basic_friction_angle", ()
-            elsewhere = f", or {' and '.join(sources)} in [material]" if sources else ""
-            problems.add(f"{place}.{key}", f"a value for {name} ({reason}){elsewhere}", NONE)
-        direction = options.get("direction", "E")
-        if row.one_direction and isinstance(direction, list):
-            problems.add("joint.direction", f"one direction for {name}", direction)
-        if row.one_load and len(loads := loads_of(scene, row)) != 1:
-            *others, last = (key for key in LOADS if key in row.arguments())
-            expected = f"exactly one of {', '.join(others)} or {last} for {name} ({reason})"
-            problems.add(row.table, expected, Words(", ".join(loads)) or NONE)
+        place = "joint" if key in (*LOADS, "shear", "block") else row.table
+        if key.endswith("friction_angle"):
+            place, key, sources = "material", "basic_friction_angle", ()
+        elsewhere = f", or {' and '.join(sources)} in [material]" if sources else ""
+        problems.add(f"{place}.{key}", f"a value for {name} ({reason}){elsewhere}", NONE)
+    direction = options.get("direction", "E")
+    if row.one_direction and isinstance(direction, list):
+        problems.add("joint.direction", f"one direction for {name}", direction)
+    if row.one_load and len(loads := loads_of(scene, row)) != 1:
+        *others, last = (key for key in LOADS if key in row.arguments())
+        expected = f"exactly one of {', '.join(others)} or {last} for {name} ({reason})"
+        problems.add(row.table, expected, Words(", ".join(loads)) or NONE)
 
 
 def _home_of(key: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import starmap
 from typing import Any
 
 import numpy as np
@@ -13,32 +12,7 @@ from fractalcontact.base.file_contents import remarks
 from fractalcontact.base.references import provenance_of
 from fractalcontact.base.study import MEMBER, group_of
 from fractalcontact.base.units import quantity_text
-from fractalcontact.scenes._result_tables import (
-    Column,
-    length,
-    plain,
-    rows,
-)
-
-# symbol of ISO 25178 and variable of `surfaces.describe` and `surfaces.texture`
-ISO_25178 = {
-    "Sq": "rms_height",
-    "Sa": "mean_absolute_height",
-    "Sp": "peak_height",
-    "Sv": "valley_depth",
-    "Sz": "peak_to_valley",
-    "Ssk": "skewness",
-    "Sku": "kurtosis",
-    "Sdq": "rms_slope",
-    "Sdr": "developed_area_excess",
-    "Sal": "autocorrelation_length",
-    "Str": "texture_aspect_ratio",
-    "Sk": "core_height",
-    "Spk": "reduced_peak_height",
-    "Svk": "reduced_valley_depth",
-}
-DIMENSIONLESS = ("skewness", "kurtosis", "rms_slope", "developed_area_excess", "texture_aspect_ratio")
-ON_SCREEN = ("Sq", "Sdq", "Sal", "Str")
+from fractalcontact.scenes._result_tables import Column, length, plain, rows
 
 
 def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -68,10 +42,6 @@ dimensions = rows(
 )  # fmt: skip
 
 
-def _iso_column(symbol: str, name: str) -> Column:
-    return Column(symbol, name, 3 if name in DIMENSIONLESS else None, screen=symbol in ON_SCREEN)
-
-
 def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield how a cloud of points became a surface: points, cells, and the plane below the heights."""
     surface = group_of(tree, "surfaces")
@@ -92,7 +62,24 @@ def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     yield text
 
 
-surfaces = rows("ISO 25178", (), *starmap(_iso_column, ISO_25178.items()), remarks=_gridding)
+surfaces = rows(
+    "ISO 25178", (),
+    Column("Sq", "rms_height"),
+    Column("Sa", "mean_absolute_height", screen=False),
+    Column("Sp", "peak_height", screen=False),
+    Column("Sv", "valley_depth", screen=False),
+    Column("Sz", "peak_to_valley", screen=False),
+    Column("Ssk", "skewness", 3, screen=False),
+    Column("Sku", "kurtosis", 3, screen=False),
+    Column("Sdq", "rms_slope", 3),
+    Column("Sdr", "developed_area_excess", 3, screen=False),
+    Column("Sal", "autocorrelation_length"),
+    Column("Str", "texture_aspect_ratio", 3),
+    Column("Sk", "core_height", screen=False),
+    Column("Spk", "reduced_peak_height", screen=False),
+    Column("Svk", "reduced_valley_depth", screen=False),
+    remarks=_gridding,
+)  # fmt: skip
 texture = rows("texture", (), *surfaces.columns)
 
 AREAS = (
