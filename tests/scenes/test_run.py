@@ -292,3 +292,21 @@ joints = ["closure", "rigid_dilatancy", "friction"]
     tree = fc.scenes.run(fc.scenes.load(path), out=None, progress=False)
     assert tree["joints/elastic_dilatancy"].normal_force.dims == ("direction", "shear", "step")
     assert np.isfinite(tree["joints/friction"].friction_angle).all()
+
+
+def test_a_file_is_read_once(tmp_path, monkeypatch):
+    lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    fc.save(lower, tmp_path / "lower.nc")
+    fc.save(lower + 1e-5, tmp_path / "upper.nc")
+    text = (
+        '[surface]\nread = "lower.nc"\n[upper]\nread = "upper.nc"\n[joint]\nblock = 1.6e-3\n'
+        'shear = [0.0, 1e-4]\n[want]\nsurfaces = ["height", "describe"]\njoints = ["rigid_dilatancy"]\n'
+    )
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    files, read = [], fc.surfaces.read
+    monkeypatch.setattr(
+        fc.surfaces, "read", lambda path, **more: files.append(path.name) or read(path, **more)
+    )
+    tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    assert files == ["lower.nc", "upper.nc"]
+    np.testing.assert_array_equal(tree["surfaces/height"], lower)
