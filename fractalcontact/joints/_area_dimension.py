@@ -117,8 +117,8 @@ def area_dimension(
     """
     towards, shears = read_direction(direction), float_array(shear)
     loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    solver = (influence, "second_order", hardness, tolerance)
-    pressing = Pressing.read(crack, WHERE, loads, solver, keep=("state",))
+    solver = {"influence": influence, "hardness": hardness, "tolerance": tolerance}
+    pressing = Pressing.read(crack, WHERE, loads, keep=("state",), **solver)
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
     pressed = []
     for factor in np.sort(used):

@@ -113,8 +113,18 @@ def closure(
     """
     directions, shears = read_directions(direction), float_array(shear)
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    solver = (influence, disc_radius, hardness, tolerance, method)
-    pressing = Pressing.read(crack, WHERE, loads, solver, bulk=bulk, keep=keep)
+    pressing = Pressing.read(
+        crack,
+        WHERE,
+        loads,
+        bulk=bulk,
+        keep=keep,
+        influence=influence,
+        disc_radius=disc_radius,
+        hardness=hardness,
+        tolerance=tolerance,
+        method=method,
+    )
     pressed = [press_sheared(pressing, shears, towards, progress) for towards in directions]
     result = pressed_dataset(pressing, shears, directions, over_directions(pressing, pressed))
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)

@@ -126,8 +126,18 @@ def dilatancy(
     rigid = _rigid_dataset(crack, shears, directions)
     if normal_force is None:
         return rigid
-    solver = (influence, disc_radius, hardness, tolerance, method)
-    pressing = Pressing.read(crack, WHERE, {"normal_force": normal_force}, solver, bulk=bulk, keep=keep)
+    pressing = Pressing.read(
+        crack,
+        WHERE,
+        {"normal_force": normal_force},
+        bulk=bulk,
+        keep=keep,
+        influence=influence,
+        disc_radius=disc_radius,
+        hardness=hardness,
+        tolerance=tolerance,
+        method=method,
+    )
     by_direction = []
     for towards, lifted in zip(directions, rigid["rigid_dilatancy"].values, strict=True):
         if normal_stiffness is None:

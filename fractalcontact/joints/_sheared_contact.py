@@ -1,7 +1,6 @@
 """A sheared crack that is pressed: its delta-surface between the two bodies, on plain arrays.
 
-    solver = (None, "second_order", 2e9)  # influence, disc_radius, hardness
-    pressing = Pressing.read(crack, WHERE, {"normal_force": [10.0, 100.0]}, solver, keep="state")
+    pressing = Pressing.read(crack, WHERE, {"normal_force": [10.0, 100.0]}, keep="state", hardness=2e9)
     columns = press_sheared(pressing, shears, towards, progress=False)
     columns["interface_closure"], columns["state"]  # of shape (shear, step) and (shear, step, y, x)
 
@@ -77,18 +76,15 @@ class Pressing:
         crack: Crack,
         where: str,
         loads: Mapping[str, Any],
-        solver: Sequence[Any],
         *,
         bulk: str = "flat_block",
         keep: Any = (),
+        **solver: Any,
     ) -> Pressing:
-        """Return it from arguments that passed `check_pressing`.
-
-        `solver` is (influence, disc_radius, hardness, tolerance, method), or the first of these.
-        """
+        """Return it from arguments that passed `check_pressing`; `solver`: some of the options `SOLVER`."""
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-        options = ContactOptions(_boundary(crack), *solver)
+        options = ContactOptions(_boundary(crack), **solver)
         return cls(crack, where, LoadPath.among(loads), options, bulk, word_tuple(keep))
 
     @property
