@@ -31,9 +31,9 @@ def loaded(path):
     return module.total
 
 
-@pytest.fixture
-def source(tmp_path):
-    path = tmp_path / "sums.py"
+def compiled(folder):
+    """Write a source file, compile its kernel and yield the file; remove the kernel at the end."""
+    path = folder / "sums.py"
     path.write_text(SOURCE, encoding="utf-8")
     assert loaded(path)(VALUES) == 10.0
     kernel = loaded(path)
@@ -41,6 +41,17 @@ def source(tmp_path):
     assert kernel.stats.cache_hits  # nothing is compiled twice
     yield path
     shutil.rmtree(kernel.stats.cache_path, ignore_errors=True)
+
+
+@pytest.fixture
+def source(tmp_path):
+    yield from compiled(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def mended(tmp_path_factory):
+    """Yield a source file whose kernel is as it was after each test."""
+    yield from compiled(tmp_path_factory.mktemp("mended"))
 
 
 def flipped(content):
@@ -63,11 +74,11 @@ DAMAGES = {
 
 @pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_file_is_replaced(source, suffix, damage):
-    (path,) = Path(loaded(source).stats.cache_path).glob(f"*{suffix}")
+def test_damaged_file_is_replaced(mended, suffix, damage):
+    (path,) = Path(loaded(mended).stats.cache_path).glob(f"*{suffix}")
     path.write_bytes(DAMAGES[damage](path.read_bytes()))
-    assert loaded(source)(VALUES) == 10.0
-    kernel = loaded(source)
+    assert loaded(mended)(VALUES) == 10.0
+    kernel = loaded(mended)
     assert kernel(VALUES) == 10.0
     assert kernel.stats.cache_hits
 
