@@ -117,8 +117,15 @@ def area_dimension(
     """
     towards, shears = read_direction(direction), float_array(shear)
     loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    solver = {"influence": influence, "hardness": hardness, "tolerance": tolerance}
-    pressing = Pressing.read(crack, WHERE, loads, keep=("state",), **solver)
+    pressing = Pressing.read(
+        crack,
+        WHERE,
+        loads,
+        keep=("state",),
+        influence=influence,
+        hardness=hardness,
+        tolerance=tolerance,
+    )
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
     pressed = []
     for factor in np.sort(used):

@@ -137,7 +137,9 @@ def self_weight(
     attributes: dict[str, Any] = {"references": PAPER}
     if not _is_rigid(crack):
         forces = {"normal_force": pressures * crack.nominal_area}
-        pressing = Pressing.read(crack, WHERE, forces, (influence, "second_order", hardness, tolerance))
+        pressing = Pressing.read(
+            crack, WHERE, forces, influence=influence, hardness=hardness, tolerance=tolerance
+        )
         pressed = [press_sheared(pressing, shears, towards, False) for towards in directions]
         columns = over_directions(pressing, pressed)
         opening -= columns["interface_closure"]
