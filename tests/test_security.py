@@ -4,6 +4,7 @@ import ast
 import io
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import zipfile
@@ -12,6 +13,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
+from study import SOUND, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import (
@@ -21,6 +23,7 @@ from fractalcontact.base.errors import (
     UnreadableFile,
 )
 from fractalcontact.base.file_contents import file_contents
+from fractalcontact.base.signals import Stopped
 
 PACKAGE = Path(fc.__file__).parent
 # calls that run code of a string or of a file
@@ -97,20 +100,19 @@ def test_pickled_objects_are_not_made(tmp_path, name):
     assert not (tmp_path / "mark").exists()
 
 
-def test_pickled_part_of_a_stopped_study_is_not_made(tmp_path):
-    out = tmp_path / "out"
-    code = (
-        "import sys, fractalcontact as fc; from fractalcontact.scenes import _run;"
-        "_run._assemble = lambda *a, **k: sys.exit(3);"
-        "fc.scenes.run('rigid_sliding', out=sys.argv[1], progress=False)"
-    )
-    assert subprocess.run([sys.executable, "-c", code, str(out)], check=False).returncode == 3
+def test_pickled_part_of_a_stopped_study_is_not_made(tmp_path, monkeypatch):
+    scene, out = tmp_path / "study.toml", tmp_path / "out"
+    scene.write_text(SOUND, encoding="utf-8")
+    with monkeypatch.context() as patch:
+        watch_calls(patch, lambda name: signal.raise_signal(signal.SIGINT))
+        with pytest.raises(Stopped):
+            fc.scenes.run(scene, out=out, progress=False)
     parts = list((out / ".stages").rglob("*.npz"))
     assert parts
     for part in parts:
         np.savez(part, heights=np.array([Touch(tmp_path / "mark")], dtype=object))
     with pytest.warns(FractalContactWarning, match="damaged"):
-        fc.scenes.run("rigid_sliding", out=out, progress=False)
+        fc.scenes.run(scene, out=out, progress=False)
     assert (out / "result.nc").exists()
     assert not (tmp_path / "mark").exists()
 
