@@ -7,6 +7,7 @@ because they distinguish its planes; of the others, only names of `base.schema` 
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable
+from typing import Any
 
 import xarray as xr
 from xarray.indexes import PandasMultiIndex
@@ -17,7 +18,7 @@ from fractalcontact.base.validation import Problems
 
 def leading_coords(
     array: xr.DataArray | xr.Dataset, outer: Collection[Hashable], taken: Collection[str] = ()
-) -> dict[str, xr.Variable]:
+) -> dict[str, Any]:
     """Return the coordinates of the dims `outer`, and those of known names that have no other dims.
 
     Names in `taken` and `run_time` are left out, because the result has its own values under them; so are

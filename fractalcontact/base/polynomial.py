@@ -19,7 +19,7 @@ def shifted(heights: Array) -> tuple[Array, float, float]:
     """Return (heights - reference) / scale, the reference (an observed height), and the scale (a power of 2).
 
     Subtracting an observed height loses no digits of heights that are close to each other. Scaled values are
-    within -1 and 1; NaN stays.
+    within -1 and 1; NaN stays. At least one height is observed.
     """
     low, high = float(heights.min()), float(heights.max())
     if np.isfinite(low) and np.isfinite(high):

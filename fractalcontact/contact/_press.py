@@ -217,7 +217,7 @@ def _dataset(
         variables[name] = ((*leading, *dims), values.reshape(*lengths, *values.shape[1:]))
     imposed = ("closure",) if load.control == "closure" else ("normal_force", "nominal_pressure")
     variables |= {name: ("step", planes[0].columns[name]) for name in imposed}
-    coords: dict[str, Any] = dict(leading_coords(surface, leading, (*variables, "step")))
+    coords = leading_coords(surface, leading, (*variables, "step"))
     coords |= {name: variables.pop(name) for name in CONTROLS}
     coords[load.control] = ("step", np.array(load.values))  # as given, without rounding
     coords["step"] = np.arange(steps)

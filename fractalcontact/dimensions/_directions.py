@@ -185,7 +185,7 @@ def _dataset(
     for name in _OF_SURFACE:
         values = [np.nan if r.anisotropy is None else getattr(r.anisotropy, name) for r in results]
         data[name] = (leading, np.reshape(values, shape))
-    coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=(*data, "run_time")))
+    coords = leading_coords(surface, leading, taken=(*data, "run_time"))
     return xr.Dataset(data, coords=coords | {"azimuth": azimuths, "increment_lag": spacing})
 
 

@@ -224,7 +224,7 @@ def _dataset(
         data[name] = (*leading, "method"), texts.reshape(shape)
     data["topothesy"] = stacked([record.topothesy(spacing) for record in estimates])
     data["run_time"] = stacked(times)
-    coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=data))
+    coords = leading_coords(surface, leading, taken=data)
     used = [METHODS[_row(name)].references for name in names]
     references = joined_references(*used)
     coords |= {"method": np.array(names, dtype=str), "increment_lag": spacing}

@@ -127,7 +127,7 @@ def hurst_map(
         for name in _FIELDS
     }
     data["fractal_dimension"] = surface.dims, 3.0 - data["hurst"][1]
-    coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=data))
+    coords = leading_coords(surface, leading, taken=data)
     for dim, starts, edge in zip(("y", "x"), (rows, columns), edges, strict=True):
         place = surface.coords[dim].values if dim in surface.coords else None
         spacing = grid.spacing[0 if dim == "y" else 1]

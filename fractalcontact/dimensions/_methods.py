@@ -128,7 +128,8 @@ METHODS = {
         windows=_LAGS,
     ),
     "madogram": Method(
-        "slope of the mean absolute increment; as the variogram, less sensitive to outliers; no interval",
+        "slope of the mean absolute increment (structure function of order one); as the variogram, less "
+        "sensitive to outliers; no interval",
         "Gneiting, Sevcikova and Percival, Statistical Science 27 (2012) 247-277",
         curve="_variogram.madogram_curve",
         windows=_LAGS,

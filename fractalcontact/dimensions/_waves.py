@@ -443,5 +443,5 @@ def _dataset(surface: xr.DataArray, found: Sequence[Sequence[Wave]]) -> xr.Datas
         for row, each in enumerate(found):
             values[row, : len(each)] = [getattr(wave, field) for wave in each]
         data[name] = (*leading, "wave"), values.reshape(shape)
-    coords: dict[str, Any] = dict(leading_coords(surface, leading, taken=(*data, "run_time")))
+    coords = leading_coords(surface, leading, taken=(*data, "run_time"))
     return xr.Dataset(data, coords=coords | {"wave": np.arange(most)})
