@@ -323,7 +323,8 @@ def _whitening(kind: Discrepancy, bins: Bins) -> tuple[Array, float]:
     covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
     lower = np.linalg.cholesky(covariance[inside] + _FLAT)
     whitening = np.zeros(covariance.shape)
-    whitening[inside] = np.linalg.inv(lower)
+    # above the diagonal the library leaves zeros or rounding, in one process not as in another
+    whitening[inside] = np.tril(np.linalg.inv(lower))
     outside = bins.variance[~kind.inside] + 1.0
     density = -np.log(np.diag(lower)).sum() - 0.5 * np.sum(np.log(outside) + 1.0)
     return whitening, math.log(kind.prior) + float(density)
