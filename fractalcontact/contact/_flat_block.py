@@ -125,6 +125,11 @@ class FlatBlock:
     transforms: int
     residual: float
 
+    @property
+    def stopped_by(self) -> str:
+        """What ended the iteration above a tolerance that the residual exceeds."""
+        return "rounding" if self.iterations < MAX_ITERATIONS else "iteration_limit"
+
 
 @lru_cache(maxsize=4)
 def flat_block(body: Body) -> FlatBlock:

@@ -277,7 +277,7 @@ def flat_contact(problem: Problem, control: Control, tolerance: float) -> Soluti
         block.iterations,
         block.transforms,
         block.residual,
-        reason="converged" if block.residual <= tolerance else "rounding",
+        reason="converged" if block.residual <= tolerance else block.stopped_by,
         work=block.compliance * force * force,
     )
 
