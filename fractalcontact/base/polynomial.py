@@ -13,6 +13,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 # smallest singular value over the largest for which the points fix the polynomial: it is 6e-17 of a plane
 # through one line, 2e-6 through two neighbouring rows of 512 points, 6e-8 of 4096
 RANK = 1e-10
+ROUNDING = 64.0 * np.finfo(np.float64).eps  # of the greatest height: smaller residuals of planes are rounding
 
 
 def shifted(heights: Array) -> tuple[Array, float, float]:
@@ -33,6 +34,11 @@ def shifted(heights: Array) -> tuple[Array, float, float]:
     scale = math.ldexp(1.0, math.frexp(largest)[1]) if largest > 0 else 1.0
     offset /= scale
     return offset, reference, scale
+
+
+def rounding_of(heights: Array) -> float:
+    """Return up to which residual the heights, NaN where missing, may be those of a plane."""
+    return float(ROUNDING * np.nanmax(np.abs(heights)))
 
 
 def detrended(heights: Array, order: int) -> tuple[Array, bool]:

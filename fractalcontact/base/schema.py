@@ -62,6 +62,7 @@ _EVENT = _flags("continuation birth death merge split merge_and_split")
 _SIGNATURE = _flags("measured empty full no_window filled too_few unresolved")
 _SCALE_POSITION = _flags("below inside above", first=-1)
 _PREFERRED_LAW = _flags("undecided exponential hyperbolic neither")
+PREFERRED_LAW = dict(zip(_PREFERRED_LAW["flag_meanings"].split(), _PREFERRED_LAW["flag_values"], strict=True))
 _NO_INTERVAL = {"comment": "NaN where no interval with tested coverage can be given"}
 _NO_CENTRE = {"comment": "NaN where an island extends around the whole period"}
 _NO_WATER = {"comment": "NaN where no water comes from an edge or a drain"}

@@ -27,8 +27,6 @@ from fractalcontact.joints._sheared_contact import (
 )
 
 WHERE = "fractalcontact.joints.area_dimension"
-FEWEST_CELLS = 8  # along an edge of the block, at the coarsest of the default spacings
-DEFAULT_FACTORS = 3  # of them, the finest ones
 
 
 def _check(problems: Problems) -> None:
@@ -143,9 +141,9 @@ def area_dimension(
     return result.assign_attrs(achieved_residual=residual, references=references)
 
 
-def default_factors(cells: tuple[int, int]) -> Array:
-    """Return the smallest common divisors of the cells of the block that leave enough of them."""
+def default_factors(cells: tuple[int, int], count: int = 3, fewest: int = 8) -> Array:
+    """Return the smallest common divisors, `count` at most, that leave `fewest` cells along an edge."""
     common = math.gcd(*cells)
-    largest = max(1, min(cells) // FEWEST_CELLS)
+    largest = max(1, min(cells) // fewest)
     divisors = [factor for factor in range(1, largest + 1) if common % factor == 0]
-    return np.array(divisors[:DEFAULT_FACTORS])
+    return np.array(divisors[:count])

@@ -17,7 +17,6 @@ def _check(problems: Problems) -> None:
     given = problems.given
     problems.numbers("nominal_pressure", **POSITIVE | {"at_least": 0})
     check_quantities(problems, "roughness_coefficient", "wall_strength")
-    check_quantities(problems, "aperture", "compressive_strength", optional=True)
     problems.integer("cycle", at_least=1, at_most=len(CLOSURE_FITS))
     if problems.messages:
         return

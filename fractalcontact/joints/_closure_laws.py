@@ -15,6 +15,7 @@ from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import PREFERRED_LAW
 from fractalcontact.base.validation import Problems
 
 REFERENCES = (
@@ -39,30 +40,9 @@ ENDS = tuple(
     for name in ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
     for end in ("low", "high")
 )
-FEWEST_STEPS = 3  # to fit a law of two parameters
-# loading steps to prefer one law; on 18 paths of a crack 3 chose in one more, of 5 steps, 12 in four less
-FEWEST_TO_CHOOSE = 6
-LEVEL = 0.95  # of the intervals
-# of the score, as if Student's distribution held. On 300 scattered paths half way between both laws, with 6
-# to 20 steps, one of them was preferred in up to 9 % (6 steps), 6 % (8 or more); where one law was true the
-# other was preferred in up to 6 % and 2 %. At 0.95 the first were 23 % and 20 %.
-SCORE_LEVEL = 0.99
-UNDECIDED, EXPONENTIAL, HYPERBOLIC, NEITHER = (np.int8(value) for value in range(4))  # flags of preferred_law
-# scatter about a law, over the range of the closures: beyond, the law does not describe them. A choice: 6 of
-# 18 paths of a crack are beyond it, with .025 14 of them, with .1 none
-ACCEPTABLE = 0.05
-ROUNDING = 1e-12  # of that range: a smaller residual is rounding
-ROUNDED_DIGITS = 1e-14  # of the bulk part, from which the closure of the interface is a difference
-CURVE_POINTS = 400  # of half pressures inside an interval: with 1600 its ends change by 1e-5
-# greatest exponent of a local power law, per length of its three points in log pressure; 10 and 160: the same
-STEEPEST = 40.0
-# of the logarithm of a stiffness: beyond, the closure is too uneven for a law; on rough cracks 1 changed
-# nothing, and .05 the stiffness by .2 %
-GREATEST_CORRECTION = 0.2
 PREFERENCE = (
-    f"neither: the scatter about the better law is over {ACCEPTABLE:.0%} of the range of the closures; "
-    f"undecided: fewer than {FEWEST_TO_CHOOSE} loading steps, or abs(law_score) within the {SCORE_LEVEL:.0%} "
-    "interval of Student"
+    "neither: the scatter about the better law is over 5% of the range of the closures; undecided: fewer "
+    "than 6 loading steps, or abs(law_score) within the 99% interval of Student"
 )
 
 
@@ -154,7 +134,8 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     steps, outer = interface.shape[-1], interface.dims[:-1]
     seat = None if seating_pressure is None else float(seating_pressure)
     bulk = closure["bulk_closure"].values if "bulk_closure" in closure else np.zeros(1)
-    rounding = ROUNDED_DIGITS * float(np.fmax.reduce(np.abs(bulk), axis=None))
+    # digits of the bulk part, from which the closure of the interface is a difference
+    rounding = 1e-14 * float(np.fmax.reduce(np.abs(bulk), axis=None))
     if "converged" in closure and not closure["converged"].values.all():
         message = "fractalcontact.joints.closure_laws: steps that did not converge are fitted like the others"
         warnings.warn(message, ConvergenceWarning, stacklevel=4)
@@ -182,37 +163,61 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
 
 
 def fit_laws(
-    pressure: Array, closure: Array, seat: float | None = None, rounding: float = 0.0
+    pressure: Array, closure: Array, seat: float | None = None, rounding: float = 0.0, level: float = 0.95
 ) -> tuple[dict[str, float], np.int8]:
     """Return constants, intervals and misfits of both laws, their score, and the flag of the better one.
 
-    A closure that varies by no more than `rounding` has no law.
+    A closure that varies by no more than `rounding` has no law; `level` is that of the intervals.
     """
     fit = dict.fromkeys((*FITS, *ENDS, "law_score"), math.nan)
     steps = first_loading(pressure, closure)
     if seat is not None:
         steps = steps[pressure[steps] > seat]
-    if steps.size < FEWEST_STEPS or not np.ptp(closure[steps]) > rounding:
-        return fit, UNDECIDED
+    if steps.size < 3 or not np.ptp(closure[steps]) > rounding:  # a law has two parameters
+        return fit, PREFERRED_LAW["undecided"]
     p, w = pressure[steps], closure[steps]
-    exponential = fit_exponential(p, w)
-    hyperbola = fit_hyperbola(p if seat is None else p - seat, w)
+    exponential = fit_exponential(p, w, level)
+    hyperbola = fit_hyperbola(p if seat is None else p - seat, w, level)
     fit |= dict(zip(FITS, (*exponential.constants, *hyperbola.constants), strict=True))
     fit |= dict(zip(ENDS, (*exponential.ends, *hyperbola.ends), strict=True))
     fit["law_score"], flag = preferred_law(exponential.residual, hyperbola.residual, float(np.ptp(w)))
     return fit, flag
 
 
-def preferred_law(exponential: Array, hyperbolic: Array, span: float) -> tuple[float, np.int8]:
+def preferred_law(
+    exponential: Array,
+    hyperbolic: Array,
+    span: float,
+    *,
+    acceptable: float = 0.05,
+    fewest: int = 6,
+    level: float = 0.99,
+) -> tuple[float, np.int8]:
     """Return the statistic of Vuong (1989), positive for the exponential law, and the flag of the better law.
 
     With equal numbers of parameters it is the mean difference of the log-likelihoods of the points over its
     standard error. Student's distribution takes the place of the normal one, for the points are few.
+
+    Parameters
+    ----------
+    exponential, hyperbolic : ndarray
+        Residuals of the laws.
+    span : float
+        Range of the closures.
+    acceptable : float
+        Scatter over the range, beyond which a law does not describe the closures. A choice: 6 of 18 paths of
+        a crack are beyond it, with .025 14 of them, with .1 none.
+    fewest : int
+        Steps to prefer one law. On 18 paths of a crack 3 chose in one more, of 5 steps, 12 in four less.
+    level : float
+        Of the score, as if Student's distribution held. On 300 scattered paths half way between both laws,
+        with 6 to 20 steps, one of them was preferred in up to 9 % (6 steps), 6 % (8 or more); where one law
+        was true the other was preferred in up to 6 % and 2 %. At 0.95 the first were 23 % and 20 %.
     """
     from scipy.special import stdtrit
 
     n = exponential.size
-    squares = [np.maximum(np.abs(each), ROUNDING * span) ** 2 for each in (exponential, hyperbolic)]
+    squares = [np.maximum(np.abs(each), _rounding(span)) ** 2 for each in (exponential, hyperbolic)]
     variances = [float(np.mean(square)) for square in squares]
     scatter = math.sqrt(min(variances) * n / max(n - 2, 1))
     points = [
@@ -221,11 +226,16 @@ def preferred_law(exponential: Array, hyperbolic: Array, span: float) -> tuple[f
     difference = points[0] - points[1]
     spread = float(np.std(difference, ddof=1)) / math.sqrt(n)
     score = float(np.mean(difference)) / spread if spread > 0 else 0.0
-    if scatter > ACCEPTABLE * span:
-        return score, NEITHER
-    if n < FEWEST_TO_CHOOSE or abs(score) <= float(stdtrit(n - 1, 0.5 * (1 + SCORE_LEVEL))):
-        return score, UNDECIDED
-    return score, EXPONENTIAL if score > 0 else HYPERBOLIC
+    if scatter > acceptable * span:
+        return score, PREFERRED_LAW["neither"]
+    if n < fewest or abs(score) <= float(stdtrit(n - 1, 0.5 * (1 + level))):
+        return score, PREFERRED_LAW["undecided"]
+    return score, PREFERRED_LAW["exponential" if score > 0 else "hyperbolic"]
+
+
+def _rounding(span: float) -> float:
+    """Return the smallest residual of closures of this range that is not rounding."""
+    return 1e-12 * span
 
 
 def first_loading(pressure: Array, closure: Array) -> Array:
@@ -265,14 +275,14 @@ class Fit(NamedTuple):
     residual: Array
 
 
-def fit_exponential(pressure: Array, closure: Array) -> Fit:
+def fit_exponential(pressure: Array, closure: Array, level: float) -> Fit:
     """Fit w = l ln(p/p0), by linear regression over ln p; the interval of p0 is that of Fieller (1954)."""
     from scipy.special import stdtrit
 
     x, n = np.log(pressure), pressure.size
     length, offset = (float(value) for value in np.polyfit(x, closure, 1))
     residual = closure - length * x - offset
-    quantile = float(stdtrit(n - 2, 0.5 * (1 + LEVEL)))
+    quantile = float(stdtrit(n - 2, 0.5 * (1 + level)))
     variance, spread = float(residual @ residual) / (n - 2), float(np.sum((x - x.mean()) ** 2))
     margin = quantile * math.sqrt(variance / spread)
     # (w_mean + l u)^2 <= quantile^2 variance (1/n + u^2/spread), with u = ln p0 - mean(ln p)
@@ -286,7 +296,7 @@ def fit_exponential(pressure: Array, closure: Array) -> Fit:
     return Fit(constants, (length - margin, length + margin, float(low), float(high)), residual)
 
 
-def fit_hyperbola(pressure: Array, closure: Array) -> Fit:
+def fit_hyperbola(pressure: Array, closure: Array, level: float) -> Fit:
     """Fit w = p Vm/(Kni Vm + p).
 
     For a given half pressure Kni Vm, at which half of Vm is reached, the best Vm follows from one linear
@@ -315,12 +325,12 @@ def fit_hyperbola(pressure: Array, closure: Array) -> Fit:
     is_straight = best == grid.size - 1  # no curvature within the forces
     misfit = math.sqrt(float(np.mean(residual**2)))
     constants = math.exp(minimum.x) * stiffness_unit, math.inf if is_straight else greatest, misfit
-    ends = _hyperbola_ends(p, w, squared_misfit, grid, float(minimum.x))
+    ends = _hyperbola_ends(p, w, squared_misfit, grid, float(minimum.x), level)
     return Fit(constants, (ends[0] * largest, ends[1] * largest, ends[2], ends[3]), residual)
 
 
 def _hyperbola_ends(
-    p: Array, w: Array, squared_misfit: Callable[[float], float], grid: Array, best: float
+    p: Array, w: Array, squared_misfit: Callable[[float], float], grid: Array, best: float, level: float
 ) -> tuple[float, float, float, float]:
     """Return the low and high ends of Kni and Vm, where the profile of the sum of squares reaches its limit.
 
@@ -330,8 +340,8 @@ def _hyperbola_ends(
     from scipy.optimize import brentq
     from scipy.special import fdtri
 
-    limit = squared_misfit(best) * (1 + float(fdtri(1, p.size - 2, LEVEL)) / (p.size - 2))
-    limit = max(limit, p.size * (ROUNDING * float(np.ptp(w))) ** 2)
+    limit = squared_misfit(best) * (1 + float(fdtri(1, p.size - 2, level)) / (p.size - 2))
+    limit = max(limit, p.size * _rounding(float(np.ptp(w))) ** 2)
 
     def excess(log_half: float) -> float:
         return squared_misfit(log_half) - limit
@@ -340,8 +350,8 @@ def _hyperbola_ends(
         math.nan if excess(end) <= 0 else float(brentq(excess, end, best, xtol=1e-12))
         for end in (grid[0], grid[-1])
     )
-    halves = np.exp(np.linspace(grid[0] if math.isnan(low) else low, grid[-1] if math.isnan(high) else high,
-                                CURVE_POINTS))  # fmt: skip
+    first, last = grid[0] if math.isnan(low) else low, grid[-1] if math.isnan(high) else high
+    halves = np.exp(np.linspace(first, last, 400))  # with 1600 half pressures the ends change by 1e-5
     shapes = p / (halves[:, None] + p)
     squares = np.sum(shapes**2, axis=1)
     middle = shapes @ w / squares
@@ -398,7 +408,8 @@ def log_slopes(log_pressure: Array, closure: Array) -> Array:
     slopes = np.empty(x.size)
     for i, start in enumerate(np.clip(np.arange(x.size) - 1, 0, x.size - 3)):
         slope, product = _local_slope(x[triples[start]], w[triples[start]], exponents[start], i - start)
-        correction = np.clip(rates[start] * product / 6.0, -GREATEST_CORRECTION, GREATEST_CORRECTION)
+        # beyond .2 the closure is too uneven for a law; on rough cracks 1 changed nothing, .05 slopes by .2 %
+        correction = np.clip(rates[start] * product / 6.0, -0.2, 0.2)
         slopes[order[i]] = slope * math.exp(correction)
     return slopes
 
@@ -415,7 +426,7 @@ def _local_exponent(x: Array, w: Array) -> float:
     def excess(m: float) -> float:
         return float(np.expm1(m * far) / np.expm1(m * near) - ratio if m else far / near - ratio)
 
-    ends = -STEEPEST / far, STEEPEST / far
+    ends = -40.0 / far, 40.0 / far  # 10 and 160 gave the same stiffnesses on rough cracks
     if excess(ends[0]) >= 0 or excess(ends[1]) <= 0:
         return math.nan
     return float(brentq(excess, *ends, xtol=1e-14))

@@ -20,9 +20,8 @@ from fractalcontact.base.validation import NONE, Problems
 Pair = tuple[float, float]
 
 WHERE = "fractalcontact.joints.Crack"
-SMALLEST = 3  # cells along an edge of the block
 SHIFT_ROUNDING = 1e-6  # cells; a shift this close to whole cells is rounded to them
-MATERIAL: dict[str, dict[str, Any]] = {"young": {"above": 0.0}, "poisson": {"above": -1.0, "at_most": 0.5}}
+MATERIAL = ("young", "poisson")
 FILL = "see fractalcontact.surfaces.fill"
 
 
@@ -141,10 +140,9 @@ class Crack:
 
     def __post_init__(self) -> None:
         with Problems(WHERE) as problems:
-            for name, value in (("young", _elastic_young(problems, self.young)), ("poisson", self.poisson)):
-                bounds = MATERIAL[name]
-                if problems.numbers(name, value, optional=True, **bounds) and value is not None:
-                    problems.require(float_array(value).size <= 2, name, "one value or (lower, upper)", value)
+            expected, young = "one value or (lower, upper)", _elastic_young(problems, self.young)
+            _check_one_or_two(problems, "young", young, expected, above=0)
+            _check_one_or_two(problems, "poisson", self.poisson, expected, above=-1, at_most=0.5)
             problems.number("basic_friction_angle", self.basic_friction_angle, at_least=0, below=90)
             layout = _check_faces(problems, self.lower, self.upper, self.block)
         for name in MATERIAL:
@@ -232,6 +230,14 @@ class Crack:
         }
 
 
+def _check_one_or_two(problems: Problems, name: str, value: Any, expected: str, **bounds: Any) -> bool:
+    """Check for one number, two numbers, or None."""
+    valid = problems.numbers(name, value, optional=True, **bounds)
+    if not valid or value is None:
+        return valid
+    return problems.require(float_array(value).size <= 2, name, expected, value)
+
+
 def _elastic_young(problems: Problems, young: Any) -> Any:
     """Return Young's modulus with any number for that of a rigid body, and check that one body is elastic."""
     values = as_array(young)
@@ -260,10 +266,8 @@ def _words(value: float | Pair, units: str) -> str:
 
 def _check_faces(problems: Problems, lower: Any, upper: Any, block: Any) -> Block | None:
     """Check faces and block; return the block in cells unless it is not valid."""
-    block_is_valid = problems.numbers("block", block, above=0, at_most=1e100, optional=True)
-    if block_is_valid and block is not None:
-        expected = "one edge length or (y, x), in metres"
-        block_is_valid = problems.require(float_array(block).size <= 2, "block", expected, block)
+    expected = "one edge length or (y, x), in metres"
+    block_is_valid = _check_one_or_two(problems, "block", block, expected, above=0, at_most=1e100)
     layout = None
     lower_is_valid = problems.surface("lower", lower, finite=False)
     if lower_is_valid and block_is_valid:
@@ -275,8 +279,8 @@ def _check_faces(problems: Problems, lower: Any, upper: Any, block: Any) -> Bloc
     return layout
 
 
-def _layout(problems: Problems, block: Any, grid: Grid) -> Block | None:
-    """Return the block in cells, None where it does not fit its face."""
+def _layout(problems: Problems, block: Any, grid: Grid, fewest: int = 3) -> Block | None:
+    """Return the block in cells, None where it does not fit its face or has fewer cells than a surface."""
     face, spacing = (grid.shape[0], grid.shape[1]), (grid.spacing[0], grid.spacing[1])
     cells = face
     if block is not None:
@@ -284,8 +288,8 @@ def _layout(problems: Problems, block: Any, grid: Grid) -> Block | None:
         cells = (math.floor(edges[0] / spacing[0] + 0.5), math.floor(edges[1] / spacing[1] + 0.5))
     fits = True
     for name, b, n, step in zip(("y", "x"), cells, face, spacing, strict=True):
-        expected = f"{SMALLEST * step:g} to {n * step:g} m along {name} ({SMALLEST} to {n} cells)"
-        fits &= problems.require(SMALLEST <= b <= n, "block", expected, f"{b * step:g} m ({b} cells)")
+        expected = f"{fewest * step:g} to {n * step:g} m along {name} ({fewest} to {n} cells)"
+        fits &= problems.require(fewest <= b <= n, "block", expected, f"{b * step:g} m ({b} cells)")
     start = ((face[0] - cells[0]) // 2, (face[1] - cells[1]) // 2)
     return Block(face, cells, start, spacing, (grid.periodic[0], grid.periodic[1])) if fits else None
 

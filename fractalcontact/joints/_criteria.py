@@ -18,7 +18,6 @@ from fractalcontact.base.compass import check_direction
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
 
-MPA, MM, MICRON = 1e6, 1e-3, 1e-6  # units of the published fits
 SAMPLE_LENGTH = 0.1  # m: the joint to which JRC and JCS of a laboratory sample refer
 LARGEST_JRC = 20.0  # end of the scale of standard profiles (Barton and Choubey 1977)
 POSITIVE: dict[str, Any] = {"at_least": 1e-30, "at_most": 1e30}  # ratios and powers do not overflow
@@ -39,26 +38,13 @@ BOUNDS: dict[str, dict[str, Any]] = {
 # Shear strength
 
 LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
-FITTED_STRESS = (0.01, 0.3)  # normal stress over wall strength of the tests of Barton and Choubey (1977)
-SHEARED_POWER, DILATION_POWER = 1.5, 4.0  # L and K of Ladanyi and Archambault (1970)
-# A0 of the joints of Xia et al. is near one half. The factor 4 A0 is 2 there and 20 % off at these bounds; on
-# saw teeth of A0 = .77 the criterion gives 77 degrees where Patton has 35.
-FACING_SHARE = (0.4, 0.6)
-# mobilised over peak roughness against displacement over that at the peak (Barton 1982); before the first
-# point friction alone is mobilised, from 0 on
-MOBILISED = np.array(
-    [(0.3, 0.0), (0.6, 0.75), (1.0, 1.0), (2.0, 0.85), (4.0, 0.7), (10.0, 0.5), (100.0, 0.0)]
-)
 
 
-# of the integral of the dilation: with 400 it changes by up to 3e-4, stresses against a spring too
-FEWEST_STEPS = 200
-
-
-def check_quantities(problems: Problems, *names: str, optional: bool = False) -> None:
-    """Check arguments against `BOUNDS`; `optional` allows None."""
-    for name in names:
-        problems.number(name, **BOUNDS[name], optional=optional)
+def check_quantities(problems: Problems, *required: str, **bounds: dict[str, Any]) -> None:
+    """Check the arguments of the call that have `BOUNDS`, or others here; those required not None."""
+    for name in vars(problems.given):
+        if name in BOUNDS:
+            problems.number(name, **BOUNDS[name] | bounds.get(name, {}), optional=name not in required)
 
 
 def check_measured(problems: Problems, *measures: Any) -> None:
@@ -111,11 +97,14 @@ def roughness_angle(pressure: Array, roughness: float, wall_strength: float, res
 
 
 def mobilised_angle(relative_displacement: float, peak_angle: Array, residual_angle: float) -> Array:
-    """Return the mobilised angle of the roughness at a displacement over that of the peak (Barton 1982)."""
-    start = MOBILISED[0, 0]
-    if relative_displacement < start:
-        return np.full(peak_angle.shape, -residual_angle * (1.0 - relative_displacement / start))
-    return peak_angle * float(np.interp(relative_displacement, *MOBILISED.T))
+    """Return the mobilised angle of the roughness at a displacement over that of the peak (Barton 1982).
+
+    Up to 0.3 friction alone is mobilised, from 0 on; beyond, the roughness is, over that at the peak.
+    """
+    if relative_displacement < 0.3:
+        return np.full(peak_angle.shape, -residual_angle * (1.0 - relative_displacement / 0.3))
+    displacements, mobilised = (0.3, 0.6, 1.0, 2.0, 4.0, 10.0, 100.0), (0.0, 0.75, 1.0, 0.85, 0.7, 0.5, 0.0)
+    return peak_angle * float(np.interp(relative_displacement, displacements, mobilised))
 
 
 def damage_coefficient(pressure: Array, roughness: float, wall_strength: float) -> Array:
@@ -133,11 +122,13 @@ def barton_shear(
     residual_angle: float,
     damage: float | None,
     stiffness: float,
+    steps: int = 200,
 ) -> dict[str, Array]:
     """Return stresses, angles and dilation by mobilised roughness, shape (displacement, pressure).
 
     `joint` is that of `longer_joint`, `damage` M, None for that of `damage_coefficient`, `stiffness` that of
-    a spring per area, Pa/m. The dilation is the integral of the tangent of its angle.
+    a spring per area, Pa/m. The dilation is the integral of the tangent of its angle over `steps`; with 400
+    it and stresses against a spring change by up to 3e-4.
     """
     jrc, jcs, peak = joint
 
@@ -149,7 +140,7 @@ def barton_shear(
         return np.radians(residual_angle + mobilised), np.radians(np.clip(mobilised, 0.0, None) / by)
 
     # steps finer than the displacements in between
-    fine = np.union1d(displacement, np.linspace(0.0, displacement[-1], FEWEST_STEPS + 1))
+    fine = np.union1d(displacement, np.linspace(0.0, displacement[-1], steps + 1))
     sigma, opening, rise = pressure, np.zeros_like(pressure), angles(0.0, pressure)[1]
     rows, last, before = [], 0.0, rise
     for place in fine:
@@ -176,12 +167,13 @@ def ladanyi_archambault(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     """Return the strength where a share of the asperities is sheared off, and the rest is overridden.
 
     tau = (sigma (1 - a)(v + tan phi) + a s_r)/(1 - (1 - a) v tan phi), with the strength s_r of the material
-    by the parabola of Fairhurst. Above the wall strength the material fails.
+    by the parabola of Fairhurst, a = 1 - (1 - sigma/JCS)^1.5 and v = (1 - sigma/JCS)^4 tan i (1970). Above
+    the wall strength the material fails.
     """
     relative = pressure / joint.wall_strength
     remaining = np.clip(1.0 - relative, 0.0, None)
-    sheared = 1.0 - remaining**SHEARED_POWER  # a
-    dilation = remaining**DILATION_POWER * math.tan(math.radians(joint.asperity_angle))  # v
+    sheared = 1.0 - remaining**1.5  # a
+    dilation = remaining**4.0 * math.tan(math.radians(joint.asperity_angle))  # v
     friction = math.tan(math.radians(joint.basic_angle))
     ratio = joint.wall_strength / joint.tensile_strength  # n
     material = joint.wall_strength * (math.sqrt(1.0 + ratio) - 1.0) / ratio * np.sqrt(1.0 + ratio * relative)
@@ -208,10 +200,12 @@ def _barton(pressure: Array, joint: Joint, roughness: float, wall_strength: floa
 
 
 def in_tested_range(pressure: Array, wall_strength: float, roughness: float) -> Array:
-    """Return where a stress and a JRC are among those of the tests of Barton and Choubey (1977)."""
+    """Return where a stress and a JRC are among those of the tests of Barton and Choubey (1977).
+
+    They were made at 0.01 to 0.3 of the wall strength.
+    """
     relative = pressure / wall_strength
-    inside = (relative >= FITTED_STRESS[0]) & (relative <= FITTED_STRESS[1])
-    return np.asarray(inside & (0.0 <= roughness <= LARGEST_JRC))
+    return np.asarray((relative >= 0.01) & (relative <= 0.3) & (0.0 <= roughness <= LARGEST_JRC))
 
 
 def grasselli_egger(pressure: Array, joint: Joint) -> tuple[Array, Array]:
@@ -234,8 +228,9 @@ def xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     angle = joint.basic_angle + 4.0 * joint.area_fraction * metric * (1.0 + share)
     possible = angle < 90.0
     strength = pressure * np.tan(np.radians(np.where(possible, angle, np.nan)))
-    low, high = FACING_SHARE
-    return strength, _by_facets(pressure, joint) & possible & (low <= joint.area_fraction <= high)
+    # A0 of the joints of Xia et al. is near one half. The factor 4 A0 is 2 there and 20 % off at the bounds;
+    # on saw teeth of A0 = .77 the criterion gives 77 degrees where Patton has 35.
+    return strength, _by_facets(pressure, joint) & possible & (0.4 <= joint.area_fraction <= 0.6)
 
 
 def _by_facets(pressure: Array, joint: Joint) -> Array:
@@ -312,16 +307,17 @@ def bandis_constants(
     In mm and MPa a = JRC/5 (0.2 UCS/JCS - 0.1), if not given, Kni = -7.15 + 1.75 JRC + 0.02 JCS/a, and Vm as
     above; the last two NaN for a joint that is closed.
     """
+    mpa, mm = 1e6, 1e-3
     jrc, jcs = float(roughness_coefficient), float(wall_strength)
     if aperture is None:
         strengths = float(compressive_strength or jcs) / jcs
-        aperture = jrc / 5 * (0.2 * strengths - 0.1) * MM
+        aperture = jrc / 5 * (0.2 * strengths - 0.1) * mm
     aperture = float(aperture)
     if not aperture > 0:  # without roughness
         return aperture, math.nan, math.nan
-    stiffness = (-7.15 + 1.75 * jrc + 0.02 * (jcs / MPA) / (aperture / MM)) * (MPA / MM)
+    stiffness = (-7.15 + 1.75 * jrc + 0.02 * (jcs / mpa) / (aperture / mm)) * (mpa / mm)
     a, b, c, d = CLOSURE_FITS[int(cycle)]
-    return aperture, stiffness, (a + b * jrc + c * ((jcs / MPA) / (aperture / MM)) ** d) * MM
+    return aperture, stiffness, (a + b * jrc + c * ((jcs / mpa) / (aperture / mm)) ** d) * mm
 
 
 def hyperbolic_closure(pressure: Array, initial_stiffness: float, greatest_closure: float) -> Array:
@@ -334,7 +330,7 @@ def hyperbolic_closure(pressure: Array, initial_stiffness: float, greatest_closu
 
 def barton_aperture(aperture: Any, roughness_coefficient: Any) -> Any:
     """Return e = E^2/JRC^2.5 in micrometres, at most E (Barton, Bandis and Bakhtar 1985)."""
-    return aperture * np.minimum(aperture / (roughness_coefficient**2.5 * MICRON), 1.0)
+    return aperture * np.minimum(aperture / (roughness_coefficient**2.5 * 1e-6), 1.0)
 
 
 def lognormal_aperture(aperture: Any, spread: Any) -> Any:
@@ -365,10 +361,6 @@ HYDRAULIC_APERTURE = {
     "zimmerman_bodvarsson": ApertureModel(zimmerman_bodvarsson_aperture, ("spread", "contact_fraction")),
     "walsh": ApertureModel(walsh_aperture, ("contact_fraction",)),
 }
-# s/E of the open part up to which its series is used: the next term, 1.9 (s/E)^4, is then 12 % of E^3
-GREATEST_VARIATION = 0.5
-# few spots: the next term of the series of (1 - c)/(1 + c), 2 c^2, is then 13 % of E^3
-GREATEST_CONTACT = 0.25
 
 # Size effect
 

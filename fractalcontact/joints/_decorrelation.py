@@ -21,7 +21,7 @@ from fractalcontact.base.compass import (
     read_directions,
 )
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.polynomial import detrended, rounding_of
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -30,13 +30,10 @@ from fractalcontact.joints._delta_surface import heights_under, missing_heights
 
 WHERE = "fractalcontact.joints.decorrelation_length"
 THRESHOLD = math.exp(-1.0)  # correlation, over that at no shear, that defines the decorrelation length
-MAX_SHEARS = 128  # of the default shears; 64 and 256 changed no length on eight faces of 400 x 400 points
+
 # tiles along an edge of the block; on eight intervals 6 and 3 changed the width by .66 to 1.9 times, 12 and 4
 # by .93 to 1.03, 16 and 8 by .67 to 1.25; coverage was checked with these
 FINE, COARSE = 8, 4
-FEWEST_LENGTHS = 15.0  # lengths in an edge of the block, below which the interval does not cover
-QUANTILE = 2.776  # of Student's t for 4 degrees of freedom: checked to cover 95 % on faces of known length
-ROUNDING = 64.0 * np.finfo(float).eps  # of the heights: a smaller residual from the mean plane is rounding
 
 
 def _check(problems: Problems) -> None:
@@ -144,17 +141,20 @@ def decorrelation_length(
     return result
 
 
-def _whole_cell_shears(crack: Crack, directions: Sequence[Direction]) -> Array:
-    """Return 0 and at most `MAX_SHEARS` whole-cell shears up to the least travel of the directions."""
+def _whole_cell_shears(crack: Crack, directions: Sequence[Direction], most: int = 128) -> Array:
+    """Return 0 and at most so many whole-cell shears up to the least travel of the directions.
+
+    With 64 and 256 of them no length on eight faces of 400 x 400 points changed.
+    """
     layout = crack.layout
     step = min(layout.spacing)
     travel = min(layout.travel(towards.unit) for towards in directions)
     if math.isinf(travel):
         travel = 0.5 * min(n * s for n, s in zip(layout.face_cells, layout.spacing, strict=True))
     cells = math.floor(travel / step * (1.0 + 1e-9))
-    if cells <= MAX_SHEARS:
+    if cells <= most:
         return np.arange(cells + 1) * step
-    return np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1, cells, MAX_SHEARS)))]) * step
+    return np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1, cells, most)))]) * step
 
 
 def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[TileSums, Array]:
@@ -171,8 +171,7 @@ def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[TileSu
 
 def _without_rounding(residual: Array, heights: Array) -> Array:
     """Return the heights from the mean plane, zero where they are only the rounding of a plane."""
-    rounding = ROUNDING * float(np.nanmax(np.abs(heights)))
-    return residual if float(np.nanmax(np.abs(residual))) > rounding else residual * 0.0
+    return residual if float(np.nanmax(np.abs(residual))) > rounding_of(heights) else residual * 0.0
 
 
 @dataclass(frozen=True)
@@ -229,7 +228,13 @@ def _tile_sum(plane: Array, side: int) -> Array:
     return plane.ravel()
 
 
-def estimate_length(sums: TileSums, shears: Array, edge: float) -> Length:
+def estimate_length(
+    sums: TileSums,
+    shears: Array,
+    edge: float,
+    fewest: float = 15.0,  # lengths in an edge, below which the interval does not cover
+    quantile: float = 2.776,  # of Student's t for 4 degrees of freedom: covers 95 % on faces of known length
+) -> Length:
     """Return the shear at which the correlation has fallen to 1/e of that at no shear, with its interval.
 
     The interval is the jackknife spread of the logarithm of the length. The variances from 8 and from 4 tiles
@@ -246,10 +251,10 @@ def estimate_length(sums: TileSums, shears: Array, edge: float) -> Length:
         return Length(value, reason="no interval: the length is below the first shear")
     if tiles < FINE * FINE:
         return Length(value, reason="no interval: the block has too few cells")
-    if edge < FEWEST_LENGTHS * value:
-        return Length(value, reason=f"no interval: the block is less than {FEWEST_LENGTHS:g} lengths wide")
+    if edge < fewest * value:
+        return Length(value, reason=f"no interval: the block is less than {fewest:g} lengths wide")
     fine, coarse = (_jackknife_variance(sums, shears, side) for side in (FINE, COARSE))
-    half_width = QUANTILE * math.sqrt(max(2.0 * coarse - fine, coarse))
+    half_width = quantile * math.sqrt(max(2.0 * coarse - fine, coarse))
     if not math.isfinite(half_width):
         return Length(value, reason="no interval: without a part of the block the faces stay correlated")
     return Length(value, value * math.exp(-half_width), value * math.exp(half_width))

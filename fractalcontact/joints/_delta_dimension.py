@@ -13,6 +13,7 @@ from fractalcontact.base.compass import read_direction
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.polynomial import rounding_of
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
@@ -23,8 +24,7 @@ from fractalcontact.joints._delta_surface import delta_surface
 Window = tuple[float, float]
 
 WHERE = "fractalcontact.joints.delta_dimension"
-WINDOW = (1.0, 16.0)  # cells; 8 in place of 16 and 2 in place of 1 change the dimensions by up to 5 and 7 %
-ROUNDING = 64.0 * np.finfo(float).eps  # of the heights: a lower delta-surface is flat
+
 FLAT = "NaN where the delta-surface is flat: a plane has no exponent"
 DIFFERENCE_QUOTIENT = (
     "at scales above the shear the delta-surface is a difference quotient of the face, rougher than any "
@@ -112,8 +112,7 @@ def delta_dimension(
     windows = _windows(window, crack.layout.spacing[1], min(crack.block))
     planes = delta_surface(crack, shears, towards.azimuth)
     heights = np.asarray(planes.std(("y", "x")).values)
-    largest = float(np.abs(np.asarray(crack.lower.values)[crack.layout.slices]).max())
-    flat = heights <= ROUNDING * largest
+    flat = heights <= rounding_of(np.asarray(crack.lower.values)[crack.layout.slices])
     rows = [_dimensions(planes.isel(shear=i), windows, bool(flat[i])) for i in range(shears.size)]
     covering, variogram, spectrum = np.transpose(rows)
     result = xr.Dataset(
@@ -131,10 +130,15 @@ def delta_dimension(
     return result
 
 
-def _windows(window: Any, spacing: float, edge: float) -> tuple[Window, Window]:
+def _windows(
+    window: Any,
+    spacing: float,
+    edge: float,
+    cells: Window = (1.0, 16.0),  # 8 for 16 and 2 for 1 change the dimensions by up to 5 and 7 %
+) -> tuple[Window, Window]:
     """Return the window of lengths and that of wavelengths, m."""
     if window is None:
-        low, high = (spacing * cells for cells in WINDOW)
+        low, high = (spacing * number for number in cells)
         return (low, min(high, edge / 4)), (4 * low, min(4 * high, edge))
     ends = float_array(window)
     return (float(ends[0]), float(ends[1])), (float(ends[0]), float(ends[1]))

@@ -25,10 +25,6 @@ from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords,
 
 WHERE = "fractalcontact.joints.delta_surface"
 DEGREE = 5  # of the spline; 3 and 7 change the heights of a fractal face by 2 and 1 % of their greatest
-SPLINE_REACH = 48  # cells beyond which a height no longer changes a quintic spline (0.43^48 = 3e-18)
-# the error of the spline is measured on so many lines of at least so many points, without so many at the
-# ends; 64 lines change it by .2 %, 1024 by none, a margin of 0 and 5 by .3 and .02 %
-ERROR_LINES, SHORTEST_LINE, ERROR_MARGIN = 256, 40, 2
 
 
 def _check(problems: Problems) -> None:
@@ -199,38 +195,46 @@ def _spline_shift(part: Array, axis: int, first: float, size: int) -> Array:
     return np.asarray(spline(first - low + np.arange(size)))
 
 
-def _spline_window(part: Array, axis: int, low: int, high: int) -> tuple[int, int]:
-    """Widen the nodes low..high by the reach of the spline, but not across missing heights."""
+def _spline_window(part: Array, axis: int, low: int, high: int, reach: int = 48) -> tuple[int, int]:
+    """Widen the nodes low..high by the reach of the spline, but not across missing heights.
+
+    A height further away no longer changes a quintic spline (0.43^48 = 3e-18).
+    """
     n = part.shape[axis]
     missing = np.flatnonzero(~np.isfinite(part).all(axis=1 - axis))
     before, after = missing[missing < low], missing[missing > high]
     lowest = before[-1] + 1 if before.size else 0
     highest = after[0] - 1 if after.size else n - 1
-    return int(max(lowest, low - SPLINE_REACH)), int(min(highest, high + SPLINE_REACH))
+    return int(max(lowest, low - reach)), int(min(highest, high + reach))
 
 
-def spline_error(face: Array, axis: int) -> float:
+def spline_error(face: Array, axis: int, most: int = 256, shortest: int = 40) -> float:
     """Return the rms error of the spline half way between the points of a face, along one axis.
 
     Splines through every second and every fourth point are compared with the heights between them. The ratio
     of the two errors extrapolates to a spline through all points: it is 2^H on a self-affine face of Hurst
-    exponent H, up to 2^6 on a smooth one. NaN where the face has no long enough line without gaps.
+    exponent H, up to 2^6 on a smooth one. It is measured on `most` lines: 64 change it by .2 %, 1024 by none.
+    NaN where the face has no line of the shortest number of points without gaps, of which every fourth
+    leaves 10 nodes with 5 points between them that count.
     """
     lines = np.moveaxis(face, axis, -1)
     lines = lines[np.isfinite(lines).all(axis=1)]
-    lines = lines[:: max(1, len(lines) // ERROR_LINES)]
-    if lines.size == 0 or lines.shape[-1] < SHORTEST_LINE:
+    lines = lines[:: max(1, len(lines) // most)]
+    if lines.size == 0 or lines.shape[-1] < shortest:
         return math.nan
     second, fourth = (_midpoint_error(lines, step) for step in (2, 4))
     return second * min(max(second / fourth, 2.0**-6), 1.0) if fourth > 0 else second
 
 
-def _midpoint_error(lines: Array, step: int) -> float:
-    """Return the rms error of a spline through every `step`-th point at the points half way between."""
+def _midpoint_error(lines: Array, step: int, margin: int = 2) -> float:
+    """Return the rms error of a spline through every `step`-th point at the points half way between.
+
+    So many of them are left out at either end: with 0 and 5 it changes by .3 and .02 %.
+    """
     from scipy.interpolate import make_interp_spline
 
     nodes, middles = lines[:, ::step], lines[:, step // 2 :: step]
     spline = make_interp_spline(np.arange(nodes.shape[1]), nodes, k=DEGREE, axis=1, check_finite=False)
-    inside = slice(ERROR_MARGIN, min(nodes.shape[1] - 1, middles.shape[1]) - ERROR_MARGIN)
+    inside = slice(margin, min(nodes.shape[1] - 1, middles.shape[1]) - margin)
     places = np.arange(nodes.shape[1])[inside] + 0.5
     return float(np.sqrt(np.mean((np.asarray(spline(places)) - middles[:, inside]) ** 2)))

@@ -23,11 +23,11 @@ from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
 from fractalcontact.joints._sheared_contact import Pressing, check_pressing
-from fractalcontact.joints._worn_joint import SMALLEST_FORCE, WHERE, WornJoint, balanced_step, shear_stiffness
+from fractalcontact.joints._worn_joint import WHERE, WornJoint, balanced_step, shear_stiffness
 
 FIRST = "NaN before the first step"
 MAPS = ("residual_lower", "residual_upper")
-LARGEST_STEP = 8  # cells along an axis in which the block comes back onto the grid
+
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
 
 
@@ -212,11 +212,11 @@ def _turning_points(path: Any) -> Array:
     return np.concatenate([[0.0], float_array(path)])
 
 
-def _cell_step(crack: Crack, towards: Direction) -> float | None:
-    """Return the shortest shear (m) that moves the block by whole cells along both axes; None without."""
+def _cell_step(crack: Crack, towards: Direction, most: int = 8) -> float | None:
+    """Return the shortest shear (m), of `most` cells, that moves the block by whole cells; None without."""
     layout = crack.layout
     axis = int(np.argmax(np.abs(towards.unit)))
-    for cells in range(1, LARGEST_STEP + 1):
+    for cells in range(1, most + 1):
         step = cells * layout.spacing[axis] / abs(towards.unit[axis])
         if all(part == math.floor(part) for part in layout.shift(step, towards.unit)):
             return step
@@ -253,7 +253,8 @@ def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, 
     )
 
     def normal_force(height: float) -> float:
-        return max(force + spring * (height - first), SMALLEST_FORCE * force)
+        # a spring may unload the block entirely; 1e-8 and 1e-4 gave the same
+        return max(force + spring * (height - first), 1e-6 * force)
 
     total = sum(leg.size - 1 for leg in legs)
     pairs = ((pair, i == 0) for leg in legs for i, pair in enumerate(itertools.pairwise(leg)))

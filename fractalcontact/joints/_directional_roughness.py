@@ -12,15 +12,12 @@ import xarray as xr
 from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import detrended, slopes
+from fractalcontact.base.polynomial import ROUNDING, detrended, rounding_of, slopes
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 
 EVERY_5_DEGREES = tuple(5.0 * i for i in range(72))
-THRESHOLDS = 200  # thresholds of dip at which the law is fitted; 100 or 400 change C by less than 0.1 %
-PART = 1 << 15  # facets at a time: 2^15 to 2^18 take 0.7 of the time of all of 512 x 512 points at once
-LARGEST_SHAPE = 1e6  # ends the search where all dips but the greatest are nearly zero
-ROUNDING = 64 * np.finfo(np.float64).eps  # smallest slope, over the greatest height over the spacing
+
 NO_FACET = "NaN where no facet faces the shear"
 REFERENCES = (
     "Grasselli, G., Wirth, J. and Egger, P., Quantitative three-dimensional description of a rough surface "
@@ -131,7 +128,7 @@ def _facets(heights: Array, spacing: Sequence[float]) -> Facets:
     """
     dy, dx = spacing
     plane_y, plane_x = slopes(heights, spacing)
-    rounding = ROUNDING * float(np.nanmax(np.abs(heights))) / min(spacing)
+    rounding = rounding_of(heights) / min(spacing)
     heights = detrended(heights, 1)[0]
     along_x, along_y = np.diff(heights, axis=1) / dx, np.diff(heights, axis=0) / dy
     south, north = along_x[:-1], along_x[1:]  # edges of the cells
@@ -149,7 +146,12 @@ def _facets(heights: Array, spacing: Sequence[float]) -> Facets:
     return Facets(slope_y, slope_x, area, (plane_y, plane_x), rounding)
 
 
-def _facing(facets: Facets, unit: tuple[float, float]) -> tuple[float, float, float, float, float]:
+def _facing(
+    facets: Facets,
+    unit: tuple[float, float],
+    thresholds: int = 200,  # of dip, at which the law is fitted; 100 and 400 change C by less than 0.1 %
+    size: int = 1 << 15,  # facets at a time: 2^15 to 2^18 take 0.7 of the time of all of 512 x 512 points
+) -> tuple[float, float, float, float, float]:
     """Return A0, theta_max, C, theta_max/(C+1) and the mean dip (degree) of the facets facing the shear.
 
     tan theta* = -tan theta cos alpha, with the dip theta of the facet from the mean plane and the angle alpha
@@ -157,7 +159,7 @@ def _facing(facets: Facets, unit: tuple[float, float]) -> tuple[float, float, fl
     """
     along = unit[0] * facets.plane[0] + unit[1] * facets.plane[1]  # slope of the mean plane along the shear
     unit_y, unit_x = (each / math.sqrt(1.0 + along**2) for each in unit)
-    parts = [slice(start, start + PART) for start in range(0, facets.area.size, PART)]
+    parts = [slice(start, start + size) for start in range(0, facets.area.size, size)]
 
     def rise_of(part: slice) -> Array:
         return unit_y * facets.rise_y[part] + unit_x * facets.rise_x[part]
@@ -167,17 +169,17 @@ def _facing(facets: Facets, unit: tuple[float, float]) -> tuple[float, float, fl
         return 0.0, 0.0, math.nan, 0.0, 0.0
     theta_max = float(np.arctan(steepest))
     # area of each class of dips 0 <= theta <= theta_max, and sum of area times dip
-    areas, moment = np.zeros(THRESHOLDS), 0.0
+    areas, moment = np.zeros(thresholds), 0.0
     for part in parts:
         rise = rise_of(part)
         area = np.where(rise > facets.rounding, facets.area[part], 0.0)
         dip = np.arctan(np.maximum(rise, 0.0))
-        bins = np.minimum((dip * (THRESHOLDS / theta_max)).astype(np.int64), THRESHOLDS - 1)
-        areas += np.bincount(bins, weights=area, minlength=THRESHOLDS)
+        bins = np.minimum((dip * (thresholds / theta_max)).astype(np.int64), thresholds - 1)
+        areas += np.bincount(bins, weights=area, minlength=thresholds)
         moment += float(np.sum(area * dip))
     facing_area = float(areas.sum())
     share = np.cumsum(areas[::-1])[::-1] / facing_area
-    shape = _fitted_shape(1.0 - np.arange(THRESHOLDS) / THRESHOLDS, share)
+    shape = _fitted_shape(1.0 - np.arange(thresholds) / thresholds, share)
     return (
         facing_area / float(np.sum(facets.area)),
         math.degrees(theta_max),
@@ -187,10 +189,11 @@ def _facing(facets: Facets, unit: tuple[float, float]) -> tuple[float, float, fl
     )
 
 
-def _fitted_shape(remainder: Array, share: Array) -> float:
+def _fitted_shape(remainder: Array, share: Array, largest: float = 1e6) -> float:
     """Return C >= 0 for which remainder^C is nearest to share, by least squares.
 
-    The derivative of the sum of squares over C is zero.
+    The derivative of the sum of squares over C is zero. Where all dips but the greatest are nearly zero, the
+    search ends beyond the largest C.
     """
     from scipy.optimize import brentq  # a scene reads the arguments of all joint functions
 
@@ -200,9 +203,9 @@ def _fitted_shape(remainder: Array, share: Array) -> float:
         power = remainder**shape
         return float(np.sum(power * log * (power - share)))
 
-    if derivative(0.0) >= -ROUNDING * THRESHOLDS:  # all facets have the same dip
+    if derivative(0.0) >= -ROUNDING * log.size:  # all facets have the same dip
         return 0.0
     high = 1.0
-    while derivative(high) < 0.0 and high < LARGEST_SHAPE:
+    while derivative(high) < 0.0 and high < largest:
         high *= 2.0
     return float(brentq(derivative, 0.0, high, xtol=1e-12)) if derivative(high) > 0.0 else high

@@ -20,12 +20,6 @@ from fractalcontact.base.coords import check_leading
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
 
-# Of the mean opening: less counts as contact. It carries 1e-9 of the flow of the mean, and is lost in the
-# rounding of greater links beside it. In 600 drawn gaps with openings over 1 to 11 decades the pressures were
-# wrong by up to .003 of their range, against .7 with 1e-4, 6 with 1e-5 and 1e76 with 0. Of rough faces that
-# `press` closed up to where the flow stops, the flow is the same to 7 digits.
-SMALLEST_OPENING = 1e-3
-
 REMEDY = "fill the faces with fractalcontact.surfaces.fill, or close what is unknown with gap.fillna(0)"
 
 
@@ -41,10 +35,16 @@ def check_gap(problems: Problems, gap: Any, taken: Collection[str]) -> bool:
     return problems.require(below == 0, "gap", expected, f"{below} planes that are below zero everywhere")
 
 
-def narrow_cells(gap: Array) -> Array:
-    """Return which open cells are too narrow to conduct."""
+def narrow_cells(gap: Array, smallest: float = 1e-3) -> Array:
+    """Return which open cells are too narrow to conduct: open by less than a share of the mean opening.
+
+    One carries 1e-9 of the flow of the mean, and is lost in the rounding of greater links beside it. In 600
+    drawn gaps with openings over 1 to 11 decades the pressures were wrong by up to .003 of their range,
+    against .7 with 1e-4, 6 with 1e-5 and 1e76 with 0. Of rough faces that `press` closed up to where the flow
+    stops, the flow is the same to 7 digits.
+    """
     mean = np.maximum(gap, 0.0).mean(axis=(-2, -1), keepdims=True)
-    return np.asarray((gap > 0) & (gap < SMALLEST_OPENING * mean))
+    return np.asarray((gap > 0) & (gap < smallest * mean))
 
 
 def conducting(gap: Array) -> Array:

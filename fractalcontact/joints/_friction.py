@@ -22,7 +22,7 @@ FORMS = {
     "kinematic": "basic friction angle plus atan(d delta/dv)",
     "energy": "basic friction angle plus atan(d delta/dv + (1/N) dU/dv)",
 }
-LOCKED_ANGLE = 90.0  # degree
+
 LOCKED = (
     "NaN where the friction angle reaches 90 degrees: the faces are locked and cannot slide without damage"
 )
@@ -36,9 +36,6 @@ ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
 # a window given as a decimal must not lose a point to rounding, nor one of two equally near points
 WINDOW_ROUNDING = 1.0 + 1e-9
 PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
-FEWEST_STEPS = 2  # of shear in the default distance: the peak over half of it is then known as well
-HALVINGS = 20  # of the distance, and doublings: a factor of a million, more than any path of shears resolves
-NEGLIGIBLE = 1.0  # degree; change of the peak when the distance is halved
 
 
 def _check(problems: Problems) -> None:
@@ -214,14 +211,15 @@ def _angle(lift: xr.DataArray, smoothing: float | None) -> xr.DataArray:
 
 
 def _strength(angle: xr.DataArray, pressure: xr.DataArray) -> xr.DataArray:
-    tangent = angle.copy(data=np.tan(np.radians(angle.where(angle < LOCKED_ANGLE).values)))
+    tangent = angle.copy(data=np.tan(np.radians(angle.where(angle < 90.0).values)))
     return (tangent * pressure).transpose(..., "step", missing_dims="ignore")
 
 
 def default_distance(dilatancy: xr.Dataset, shears: Array) -> float:
     """Return the shear over which the peak is taken: 1 % of the side of the block, if the shears allow."""
     side = float(np.nan_to_num(dilatancy["nominal_area"])) ** 0.5 if "nominal_area" in dilatancy else 0.0
-    resolved = max(PEAK_SHARE * side, FEWEST_STEPS * float(np.median(np.diff(shears))))
+    # at least two steps: the peak over half of them is then known as well
+    resolved = max(PEAK_SHARE * side, 2.0 * float(np.median(np.diff(shears))))
     return min(resolved, float(np.ptp(shears)))
 
 
@@ -231,7 +229,7 @@ def _secant_angles(lift: xr.DataArray, length: float) -> xr.DataArray:
     The distances are `length`, halved and doubled as often as the shears resolve.
     """
     shears = _shears(lift)
-    candidates = length * 2.0 ** np.arange(-HALVINGS, HALVINGS + 1)
+    candidates = length * 2.0 ** np.arange(-20, 21)  # a million times: more than any path of shears resolves
     finest, reach = np.diff(shears).min() / WINDOW_ROUNDING, np.ptp(shears) * WINDOW_ROUNDING
     candidates = candidates[(candidates == length) | ((candidates >= finest) & (candidates <= reach))]
     resolved = np.isfinite(secant_slopes(shears, shears[:, None], candidates)).any(axis=(1, 2))
@@ -284,7 +282,7 @@ def secant_slopes(shears: Array, curves: Array, distances: Array) -> Array:
 
 def _peaks(secants: xr.DataArray, pressure: xr.DataArray | None, length: float) -> xr.Dataset:
     """Return the greatest secant friction angle and strength of every distance, and those of `length`."""
-    locked = (secants >= LOCKED_ANGLE).any("shear")
+    locked = (secants >= 90.0).any("shear")
     columns = {"friction_angle": secants}
     if pressure is not None:
         if "shear" in pressure.dims:  # against a spring: the mean over the distance
@@ -316,17 +314,20 @@ def _shears(curve: xr.DataArray | xr.Dataset) -> Array:
     return np.asarray(curve["shear"].values, dtype=np.float64)
 
 
-def _dependence(secants: xr.DataArray) -> str:
-    """Return how the peak depends on the distance, from the two shortest that the shears resolve."""
+def _dependence(secants: xr.DataArray, negligible: float = 1.0) -> str:
+    """Return how the peak depends on the distance, from the two shortest that the shears resolve.
+
+    A change of so many degrees is as good as none.
+    """
     greatest = secants.max("shear").transpose("distance", ...)
-    peaks = greatest.where(greatest < LOCKED_ANGLE).values.reshape(greatest.sizes["distance"], -1)
+    peaks = greatest.where(greatest < 90.0).values.reshape(greatest.sizes["distance"], -1)
     resolved = np.flatnonzero(np.isfinite(greatest.values.reshape(peaks.shape)).any(axis=1))[:2]
     change = np.abs(np.diff(peaks[resolved], axis=0))
     if not np.isfinite(change).any():
         return NOT_KNOWN
     words = f"{np.nanmax(change):.3g} degree when the distance is halved to"
     words += f" {quantity_text(float(secants['distance'][resolved[0]]), 'm')}"
-    if np.nanmax(change) <= NEGLIGIBLE:
+    if np.nanmax(change) <= negligible:
         return f"changes by at most {words}"
     limit = (
         "the shears resolve no further halving: no limit is reached; compare only peaks over equal distances"
@@ -336,7 +337,7 @@ def _dependence(secants: xr.DataArray) -> str:
 
 def _explain(result: xr.Dataset, secants: xr.DataArray) -> None:
     """State how the peaks depend on the distance, and why values are missing."""
-    locked = bool((secants >= LOCKED_ANGLE).any())
+    locked = bool((secants >= 90.0).any())
     unresolved = bool(np.isnan(secants.sel(distance=float(result["peak_distance"])).values).all())
     reason = "; ".join([LOCKED] * locked + [UNRESOLVED] * unresolved)
     for name in (*PEAKS, *PEAK_SHEARS):

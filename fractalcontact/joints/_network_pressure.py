@@ -12,25 +12,11 @@ from fractalcontact.base.errors import MissingExtra
 from fractalcontact.base.numbers import Array
 from fractalcontact.joints._flow_network import Held, Network, dissipation, even_gradient
 
-LARGEST_DIRECT = 300_000  # unknowns up to which elimination is faster than multigrid
-# Relative error of the flow, in the norm of the preconditioner, that ends the iteration. With 1e-9 pressures
-# behind narrow openings were off by up to .02 in four gaps of 192 x 192 cells, with 1e-12 by .002.
-FLOW_ERROR = 1e-12
-RESIDUAL = 1e-6  # relative residual that must be reached as well, and the same of the range of the pressures
 ERROR = 1e-5  # of a result that is returned: elimination has 1e-7 at most, and a recursion loses a digit
 UNKNOWN = (
     "NaN where the pressure comes out beyond those at the ends, or the flow beyond its bounds: the openings "
     "differ by more than the precision of the computer resolves"
 )
-# Steps of elimination while each is less than half of the last: 2 to 5 in 420 drawn gaps, whose pressures
-# left their range by up to 3e-6 after the first step, and by 2e-16 after the last.
-REFINEMENTS = 10
-EPSILON = float(np.finfo(np.float64).eps)
-MAX_ITERATIONS = 200  # then elimination takes over; rough faces of 700 x 700 cells took 11
-COARSEST = 400  # unknowns of the coarsest grid, solved directly in a millisecond
-LEAF = 9  # cells of a part that nested dissection leaves as it is; 4 and 25 took the same time within a fifth
-
-
 # Bytes of memory at the peak, for each cell: 320 to 620 by multigrid at n = 800, as the allocator reuses its
 # pages or not. Elimination takes 760, 1430 and 1590 at n = 128, 256 and 512, up to .5 GB beside multigrid.
 FLOW_BYTES = 620.0
@@ -52,7 +38,7 @@ def nested_dissection(shape: tuple[int, ...], wraps: tuple[bool, bool]) -> Array
 
 def _dissected(cells: Array) -> list[Array]:
     """Return the cells of a part: those of its halves, then those of the line between them."""
-    if cells.size <= LEAF:
+    if cells.size <= 9:  # 4 and 25 took the same time within a fifth
         return [cells.ravel()]
     if cells.shape[0] > cells.shape[1]:
         cells = cells.T
@@ -61,14 +47,20 @@ def _dissected(cells: Array) -> list[Array]:
 
 
 def pressures(
-    network: Network, inside: Array, order: Array, held: Held, axis: int = 1
+    network: Network,
+    inside: Array,
+    order: Array,
+    held: Held,
+    axis: int = 1,
+    *,
+    largest_direct: int = 300_000,
 ) -> tuple[Array, float]:
     """Return the pressure in every cell, zero outside the chosen clusters, and its error.
 
     No pressure leaves the range of those that are held. The error is the relative residual, by how much the
     solution left that range, or by how much it dissipates more than an even gradient along `axis` (Dirichlet:
     the true pressure dissipates least), whichever is most. `inside` are whole clusters of open cells, and
-    `order` all cells as elimination takes them.
+    `order` all cells as elimination takes them, which is faster than multigrid up to `largest_direct` cells.
     """
     from scipy.sparse import coo_array, diags_array
 
@@ -85,11 +77,11 @@ def pressures(
     scale, possible = float(np.linalg.norm(balance.surplus(np.zeros(size)))) or 1.0, balance.possible
     p, most = even.ravel()[inside], dissipation(network, even, inside, held)
     if np.linalg.norm(balance.surplus(p)) > 1e-14 * scale:
-        free = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
+        unknown = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
         sequence = number[order[inside[order]]]
-        sequence = (np.cumsum(free) - 1)[sequence[free[sequence]]]
-        system = System(matrix[free][:, free], free, balance, most, RESIDUAL * scale)
-        p = _solve(system, p, sequence)
+        sequence = (np.cumsum(unknown) - 1)[sequence[unknown[sequence]]]
+        system = System(matrix[unknown][:, unknown], unknown, balance, most, scale)
+        p = _solve(system, p, sequence, largest_direct)
     missed = possible.missed_by(p)
     p = np.clip(p, possible.low, possible.high)  # what this moves is part of the error
     error = max(float(np.linalg.norm(balance.surplus(p))) / scale, missed)
@@ -144,16 +136,16 @@ class Balance(NamedTuple):
 
 
 class System(NamedTuple):
-    """Equations of the free cells, what is left of them at any pressure, and when the solution is reached.
+    """Equations of the unknown pressures, and what is left of them at any pressure.
 
-    `power` is the dissipation at the start, `residual` the greatest norm of what may be left.
+    `power` is the dissipation at the start, `scale` the norm of what is left where all pressures are zero.
     """
 
     matrix: Any
-    free: Array
+    unknown: Array
     balance: Balance
     power: float
-    residual: float
+    scale: float
 
 
 def _without_reference_cells(matrix: Any) -> Array:
@@ -161,12 +153,12 @@ def _without_reference_cells(matrix: Any) -> Array:
     from scipy.sparse.csgraph import connected_components
 
     labels = connected_components(matrix, directed=False)[1]
-    free = np.ones(labels.size, bool)
-    free[np.unique(labels, return_index=True)[1]] = False
-    return free
+    unknown = np.ones(labels.size, bool)
+    unknown[np.unique(labels, return_index=True)[1]] = False
+    return unknown
 
 
-def _solve(system: System, start: Array, order: Array) -> Array:
+def _solve(system: System, start: Array, order: Array, largest_direct: int) -> Array:
     """Solve a large system by multigrid where it is installed, a small one by elimination in this order.
 
     Elimination is refined with what is left of the balance (Wilkinson): its factors lose the level of deep
@@ -175,7 +167,7 @@ def _solve(system: System, start: Array, order: Array) -> Array:
     from scipy.sparse.linalg import splu
 
     matrix, count = system.matrix, system.matrix.shape[0]
-    if count > LARGEST_DIRECT and find_spec("pyamg") is not None:
+    if count > largest_direct and find_spec("pyamg") is not None:
         p = _conjugate_gradients(system, start, _multigrid(matrix))
         if p is not None:
             return p
@@ -188,11 +180,14 @@ def _solve(system: System, start: Array, order: Array) -> Array:
     except MemoryError as error:
         raise MissingExtra(f"the flow through {count} open cells", "pyamg", "flow") from error
     p, last = start, math.inf
-    place = np.flatnonzero(system.free)[order]
-    for _ in range(REFINEMENTS):
+    place = np.flatnonzero(system.unknown)[order]
+    # 2 to 5 steps in 420 drawn gaps, whose pressures left their range by up to 3e-6 after the first step, and
+    # by 2e-16 after the last
+    for _ in range(10):
         step = factors.solve(system.balance.surplus(p)[place])
         size = float(np.abs(step).max())
-        if not EPSILON < size < 0.5 * last:  # rounding, or a matrix that has lost its weak links
+        # rounding, or a matrix that has lost its weak links
+        if not np.finfo(np.float64).eps < size < 0.5 * last:
             break
         p, last = p.copy(), size
         p[place] += step
@@ -218,7 +213,7 @@ def _multigrid(matrix: Any) -> Any:
     while matrix.shape[0] != size:
         levels.append(MultilevelSolver.Level())
         levels[-1].A, size = matrix, matrix.shape[0]
-        if size > COARSEST:
+        if size > 400:  # fewer are solved directly in a millisecond
             strong = classical_strength_of_connection(matrix, theta=0.1)
             joined = standard_aggregation(strong)[0].astype(np.float64)
             weights = diags_array(4.0 / 3.0 / abs(matrix).sum(axis=1))
@@ -231,25 +226,47 @@ def _multigrid(matrix: Any) -> Any:
     return cycle.aspreconditioner()
 
 
-def _conjugate_gradients(system: System, start: Array, preconditioner: Any) -> Array | None:
+def _conjugate_gradients(
+    system: System,
+    start: Array,
+    preconditioner: Any,
+    *,
+    flow_error: float = 1e-12,
+    tolerance: float = 1e-6,
+    max_iterations: int = 200,
+) -> Array | None:
     """Solve A x = b by preconditioned conjugate gradients; None where the tolerance is not reached.
 
     The dissipation of the flow is `power` - b x at the solution. Before it is reached, the dissipation is too
     high by e A e (e the error of x), which r M r estimates (r the residual, M the preconditioner). Parts that
     only narrow openings join to the rest hardly dissipate: there the range of the pressures tells.
+
+    Parameters
+    ----------
+    system : System
+    start : ndarray
+        Pressures of all cells.
+    preconditioner : LinearOperator
+    flow_error : float
+        Relative error of the flow, in the norm of the preconditioner. With 1e-9 pressures behind narrow
+        openings were off by up to .02 in four gaps of 192 x 192 cells, with 1e-12 by .002.
+    tolerance : float
+        Of the relative residual, which must be reached as well, and of the range of the pressures.
+    max_iterations : int
+        Then elimination takes over; rough faces of 700 x 700 cells took 11.
     """
-    b, possible = system.balance.surplus(start)[system.free], system.balance.possible
+    b, possible = system.balance.surplus(start)[system.unknown], system.balance.possible
     p = start.copy()
     x, r = np.zeros(b.size), b.copy()
     t, previous = np.zeros(b.size), 1.0
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(max_iterations):
         z = preconditioner @ r
         r_z = float(r @ z)
-        is_balanced = np.linalg.norm(r) <= system.residual
-        flow = max(system.power - float(b @ x), FLOW_ERROR * system.power)  # none where no path crosses
-        is_balanced &= r_z <= FLOW_ERROR * flow
-        p[system.free] = start[system.free] + x
-        if is_balanced and possible.missed_by(p) <= RESIDUAL:
+        is_balanced = np.linalg.norm(r) <= tolerance * system.scale
+        flow = max(system.power - float(b @ x), flow_error * system.power)  # none where no path crosses
+        is_balanced &= r_z <= flow_error * flow
+        p[system.unknown] = start[system.unknown] + x
+        if is_balanced and possible.missed_by(p) <= tolerance:
             return p
         t = z + (r_z / previous) * t
         a_t = system.matrix @ t

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 WHERE = "fractalcontact.joints.partial_slip"
 STIFFNESSES = ("tangential_stiffness", "shear_stiffness", "interface_stiffness", "stiffness_ratio")
 RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
-BLOCK_ROUNDING = 1e-3  # above the relative error of the tangential stiffness; 1e-4 and 1e-2 gave the same
 
 
 def _check(problems: Problems) -> None:
@@ -215,9 +214,12 @@ def _block_stiffness(pressing: Pressing, path: ShearPath) -> float:
     return float(stuck.columns["tangential_stiffness"][0])
 
 
-def _without_block(stiffness: Array, block: float) -> Array:
-    """Return the stiffness of an interface in series with a block; infinite where that is all there is."""
+def _without_block(stiffness: Array, block: float, rounding: float = 1e-3) -> Array:
+    """Return the stiffness of an interface in series with a block; infinite where that is all there is.
+
+    The rounding is above the relative error of the tangential stiffness; 1e-4 and 1e-2 gave the same.
+    """
     with np.errstate(divide="ignore"):
         compliance = 1 / stiffness - 1 / block
-        is_block = np.abs(compliance) <= BLOCK_ROUNDING / block
+        is_block = np.abs(compliance) <= rounding / block
         return np.asarray(np.where(is_block, np.inf, 1 / compliance))

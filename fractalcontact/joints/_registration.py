@@ -25,34 +25,14 @@ from fractalcontact.base.validation import NONE, Problems
 Pair = tuple[float, float]
 
 WHERE = "fractalcontact.joints.register"
-SMALLEST = 16  # points along an axis
-UNCERTAIN = 1.0  # cells of standard error beyond which the position counts as undetermined
-SMOOTHING = (4.0, 2.0, 1.0)  # cells; the last width decides, and suppresses what lies between the points
-OVERLAP = 0.3  # smallest fraction of the faces that must overlap; .15 and .6 found the same place
-MAX_STEPS = 40  # at each width; 16 faces, half of them with noise, took 5 to 14 at all widths together
-# a step this small, in cells at the edge, ends the iteration; 2e-4 moved faces with noise of .1 and 1
-# increment by up to .012 of the standard error, 5e-5 by .0007, with one or two iterations more
-SMALL_STEP = 1e-4
-# so does one that is this small relative to the standard errors; .02 moved them by .004 of the error
-SETTLED = 0.01
-# Newton steps of full length; damped ones after them end a cycle of the robust weights; 5 and 20: the same
-FULL_STEPS = 10
-# along each axis, left out one by one for the standard errors, which change by .4 with 4 and by .15 with 9
-TILES = 6
-RANK = 1e-9  # relative; below it a shift or rotation does not change the match
-
-
-# Of the mismatch: a mean aperture below minus this is an overlap. The faces of a joint that touch have a mean
-# aperture of about two mismatches (1.9 of the gneiss pair), swapped ones minus that, and levelled ones none.
-OVERLAPPING = 0.5
-TURNS = {"x": 0, "y": 1}  # axis of the array that is reversed where a body is turned over about x or y
+TURNS = ("x", "y")  # about which a body may be turned over
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
     problems.choice("turn_upper", among=TURNS, optional=True)
     valid = [
-        problems.surface(name, face, finite=False, smallest=SMALLEST)
+        problems.surface(name, face, finite=False, smallest=16)  # see the widest smoothing of `find_pose`
         for name, face in (("lower", given.lower), ("upper", given.upper))
     ]
     if not all(valid):
@@ -161,7 +141,8 @@ def register(
 
 def turned_over(face: Array, axis: str | None) -> Array:
     """Return the heights of a body that is turned over about x or y; as they are without an axis."""
-    return face if axis is None else np.asarray(-np.flip(face, TURNS[axis]))
+    # about x the rows, axis 0 of the array, are reversed
+    return face if axis is None else np.asarray(-np.flip(face, TURNS.index(axis)))
 
 
 def _refuse_turned_face(
@@ -178,13 +159,17 @@ def _refuse_turned_face(
             raise InvalidInput(WHERE, [f"{problem}: it fits {remedy}"])
 
 
-def _refuse_swapped_faces(result: xr.Dataset) -> None:
-    """Raise where the upper face lies below the lower one, beyond what a tilt lifts it at its edges."""
+def _refuse_swapped_faces(result: xr.Dataset, overlap: float = 0.5) -> None:
+    """Raise where the upper face lies below the lower one, beyond what a tilt lifts it at its edges.
+
+    It does by more than `overlap` mismatches. The faces of a joint that touch have a mean aperture of about
+    two of them (1.9 of the gneiss pair), swapped ones minus that, and levelled ones none.
+    """
     mean, mismatch = float(result["aperture"].mean()), float(result["mismatch"])
     lift = sum(
         abs(float(result[f"tilt_{dim}"])) * float(np.ptp(result[dim].values)) / 2 for dim in ("x", "y")
     )
-    if mean < -OVERLAPPING * mismatch - lift - UNIFORM * float(np.abs(result["height"]).max()):
+    if mean < -overlap * mismatch - lift - UNIFORM * float(np.abs(result["height"]).max()):
         expected = (
             "an upper face above the lower one (swap lower and upper; if each was scanned with a zero of its "
             "own, raise upper by the aperture)"
@@ -194,12 +179,11 @@ def _refuse_swapped_faces(result: xr.Dataset) -> None:
 
 def _warn_uncertain(pose: Pose) -> None:
     """Warn of a position that is not determined to a point."""
-    error = max(pose.errors[:2])
-    if error > UNCERTAIN:
+    if pose.error > 1.0:
         message = (
-            f"position not determined, only to {error:.2g} points: do the faces belong together, turned by"
+            f"{WHERE}: position not determined, only to {pose.error:.2g} points: do the faces belong "
+            "together, turned by a few degrees at most?"
         )
-        message = f"{WHERE}: {message} a few degrees at most?"
         warnings.warn(message, ConvergenceWarning, stacklevel=4)
 
 
@@ -249,12 +233,24 @@ class Pose:
     determined: bool = True
 
     @property
+    def error(self) -> float:
+        """The greater standard error of the two shifts, cells."""
+        return max(self.errors[:2])
+
+    @property
     def is_certain(self) -> bool:
         """Whether the position is known to a point."""
-        return self.determined and self.converged and max(self.errors[:2]) <= UNCERTAIN
+        return self.determined and self.converged and self.error <= 1.0
 
 
-def find_pose(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> Pose:
+def find_pose(
+    lower: Array,
+    upper: Array,
+    offset: Pair,
+    rotates: bool,
+    tilts: bool,
+    smoothing: tuple[float, ...] = (4.0, 2.0, 1.0),
+) -> Pose:
     """Return the pose of the upper face.
 
     Parameters
@@ -265,6 +261,9 @@ def find_pose(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bo
         Place of the first point of `upper` on the grid of `lower`, in cells.
     rotates, tilts : bool
         Whether to fit a rotation and a tilt.
+    smoothing : tuple of float
+        Widths of the means, in cells, but no more than a 16th of an edge. The last one decides, and
+        suppresses what lies between the points.
     """
     # no step depends on a constant height between the faces or on the unit of height
     lower, upper = lower - np.nanmean(lower), upper - np.nanmean(upper)
@@ -273,9 +272,9 @@ def find_pose(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bo
         return Pose(determined=False)
     unit = math.ldexp(1.0, math.frexp(largest)[1])
     lower, upper = lower / unit, upper / unit
-    pose = Pose(shift=coarse_shift(lower, upper, offset))
     widest = min(*lower.shape, *upper.shape) / 16.0
-    for width in SMOOTHING:
+    pose = Pose(shift=coarse_shift(lower, upper, offset, widest))
+    for width in smoothing:
         # near an edge the mean of fewer heights is noisier, and would pull the edges together
         low, up = (smooth(face, min(width, widest), 0.95) for face in (lower, upper))
         pose = _refine(pose, low, up, offset, rotates, tilts)
@@ -284,11 +283,13 @@ def find_pose(lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bo
     return replace(pose, slope=(pose.slope[0] * unit, pose.slope[1] * unit))
 
 
-def coarse_shift(lower: Array, upper: Array, offset: Pair) -> Pair:
-    """Return the shift of whole cells at which the faces, without their long waves, correlate most."""
+def coarse_shift(lower: Array, upper: Array, offset: Pair, width: float, overlap: float = 0.3) -> Pair:
+    """Return the shift of whole cells at which the faces, without their long waves, correlate most.
+
+    At least the fraction `overlap` of them must do so; .15 and .6 found the same place.
+    """
     from skimage.registration import phase_cross_correlation
 
-    width = max(min(*lower.shape, *upper.shape) / 16.0, 1.0)
     shape = tuple(max(a, b) for a, b in zip(lower.shape, upper.shape, strict=True))
     planes, masks = [], []
     for face in (lower, upper):
@@ -300,7 +301,7 @@ def coarse_shift(lower: Array, upper: Array, offset: Pair) -> Pair:
         planes.append(plane / (math.sqrt(float(np.mean(plane**2))) or 1.0))
         masks.append(observed)
     correlation = phase_cross_correlation(
-        *planes, reference_mask=masks[0], moving_mask=masks[1], overlap_ratio=OVERLAP
+        *planes, reference_mask=masks[0], moving_mask=masks[1], overlap_ratio=overlap
     )
     shift = np.asarray(correlation[0], dtype=float)
     # the correlation counts from the corners of the arrays
@@ -351,25 +352,56 @@ def _centred_indices(shape: tuple[int, ...]) -> tuple[Array, Array]:
     return y - (shape[0] - 1) / 2, x - (shape[1] - 1) / 2
 
 
-def _refine(pose: Pose, lower: Array, upper: Array, offset: Pair, rotates: bool, tilts: bool) -> Pose:
-    """Take Newton steps on shift, angle, height and slope, with angle and slope only where wanted."""
+def _refine(
+    pose: Pose,
+    lower: Array,
+    upper: Array,
+    offset: Pair,
+    rotates: bool,
+    tilts: bool,
+    *,
+    max_steps: int = 40,
+    full_steps: int = 10,
+    small_step: float = 1e-4,
+    settled_step: float = 0.01,
+) -> Pose:
+    """Take Newton steps on shift, angle, height and slope, with angle and slope only where wanted.
+
+    Parameters
+    ----------
+    pose : Pose
+        Where to start.
+    lower, upper : ndarray
+        Smoothed heights.
+    offset, rotates, tilts
+        As for `find_pose`.
+    max_steps : int
+        16 faces, half of them with noise, took 5 to 14 at all widths together.
+    full_steps : int
+        Of full length; damped ones after them end a cycle of the robust weights. 5 and 20 gave the same.
+    small_step : float
+        In cells at the edge, that ends the iteration. 2e-4 moved faces with noise of .1 and 1 increment by up
+        to .012 of the standard error, 5e-5 by .0007, with one or two iterations more.
+    settled_step : float
+        Over the standard errors, that ends it as well; .02 moved faces by .004 of the error.
+    """
     gradients = np.gradient(lower), np.gradient(upper)
     edge = max(lower.shape) / 2
     used = [0, 1] + ([2] if rotates else []) + [3] + ([4, 5] if tilts else [])
     first = pose.iterations + 1
-    for iteration in range(first, first + MAX_STEPS):
+    for iteration in range(first, first + max_steps):
         system = _normal_equations(pose, lower, upper, gradients, offset, edge)
         matrix = system.matrices.sum(axis=0)[np.ix_(used, used)]
         if not _has_full_rank(matrix):
             return replace(pose, determined=False)
         step = np.zeros(6)
         step[used] = np.linalg.solve(matrix, system.vectors.sum(axis=0)[used])
-        step[:3] *= 1.0 if iteration - first < FULL_STEPS else 0.25
+        step[:3] *= 1.0 if iteration - first < full_steps else 0.25
         try:
             errors = _jackknife_errors(system, used)
         except np.linalg.LinAlgError:  # one tile alone determines the position
             return replace(pose, determined=False)
-        settled = np.abs(step[:3]).max() <= max(SMALL_STEP, SETTLED * float(np.nanmin(errors)))
+        settled = np.abs(step[:3]).max() <= max(small_step, settled_step * float(np.nanmin(errors)))
         pose = Pose(
             shift=(pose.shift[0] + step[0], pose.shift[1] + step[1]),
             angle=pose.angle + step[2] / edge,
@@ -396,7 +428,13 @@ class NormalEquations:
 
 
 def _normal_equations(
-    pose: Pose, lower: Array, upper: Array, gradients: Any, offset: Pair, edge: float
+    pose: Pose,
+    lower: Array,
+    upper: Array,
+    gradients: Any,
+    offset: Pair,
+    edge: float,
+    side: int = 6,  # tiles along an edge; the standard errors change by .4 with 4 and by .15 with 9
 ) -> NormalEquations:
     """Return the equations for the step that brings the difference of the faces to zero.
 
@@ -412,13 +450,14 @@ def _normal_equations(
     observed = np.isfinite(difference + instruments[0] + instruments[1] + columns[0] + columns[1])
     instruments, columns, target = instruments[:, observed], columns[:, observed], difference[observed]
     weights, error_factor = _robust_weights(columns, target)
-    tile = _tile_numbers(lower.shape)[observed]
-    matrices, vectors = np.empty((TILES * TILES, 6, 6)), np.empty((TILES * TILES, 6))
+    rows_of, columns_of = (np.arange(n) * side // n for n in lower.shape)
+    tile, tiles = (rows_of[:, None] * side + columns_of)[observed], side * side
+    matrices, vectors = np.empty((tiles, 6, 6)), np.empty((tiles, 6))
     for i, instrument in enumerate(instruments):
         weighted = instrument * weights
-        vectors[:, i] = np.bincount(tile, weighted * target, TILES * TILES)
+        vectors[:, i] = np.bincount(tile, weighted * target, tiles)
         for j, column in enumerate(columns):
-            matrices[:, i, j] = np.bincount(tile, weighted * column, TILES * TILES)
+            matrices[:, i, j] = np.bincount(tile, weighted * column, tiles)
     return NormalEquations(matrices, vectors, error_factor)
 
 
@@ -443,17 +482,12 @@ def _robust_weights(columns: Array, target: Array) -> tuple[Array, float]:
     return weights, float(np.sum(weights) / np.sum((1.0 - square) * weights**2))
 
 
-def _tile_numbers(shape: tuple[int, ...]) -> Array:
-    rows, columns = (np.arange(n) * TILES // n for n in shape)
-    return np.asarray(rows[:, None] * TILES + columns[None, :])
-
-
-def _has_full_rank(matrix: Array) -> bool:
-    """Return whether every parameter changes the match; the first two are the shifts."""
+def _has_full_rank(matrix: Array, least: float = 1e-9) -> bool:
+    """Return whether every parameter changes the match, by more than rounding; the shifts come first."""
     scale = np.sqrt(np.abs(np.diagonal(matrix)))
-    if not (scale > 0).all() or scale[:2].min() < RANK * scale[:2].max():  # relief along one axis alone
+    if not (scale > 0).all() or scale[:2].min() < least * scale[:2].max():  # relief along one axis alone
         return False
-    return bool(np.linalg.svd(matrix / np.outer(scale, scale), compute_uv=False)[-1] > RANK)
+    return bool(np.linalg.svd(matrix / np.outer(scale, scale), compute_uv=False)[-1] > least)
 
 
 def _jackknife_errors(system: NormalEquations, used: list[int]) -> Array:

@@ -41,12 +41,10 @@ REGRESSIONS = {
     ),
     "tatone_grasselli": (Regression(0.5e-3, -10.37, 51.85, 0.60), Regression(1e-3, -6.10, 55.03, 0.74)),
 }
-LAG_TOLERANCE = 0.1  # relative; at H = 0.7 it changes the result by 0.4
-FEWEST_PROFILES = 20  # below, the 2.5 % quantile is lower than every profile but one
-BELOW, INSIDE, ABOVE = np.int8(-1), np.int8(0), np.int8(1)
+
 OUTSIDE = "outside 0 to 20, the scale of standard profiles, it is an extrapolation (see scale_position)"
 STRAIGHT = "NaN where the profiles are straight lines: the regression takes the logarithm of their slope"
-FEW_PROFILES = f"NaN where fewer than {FEWEST_PROFILES} profiles are long enough, or some are straight lines"
+FEW_PROFILES = "NaN where fewer than 20 profiles are long enough, or some are straight lines"
 REFERENCES = (
     "Tse, R. and Cruden, D. M., Estimating joint roughness coefficients, Int. J. Rock Mech. Min. Sci. 16 "
     "(1979); Yu, X. and Vayssade, B., Joint profiles and their roughness parameters, Int. J. Rock Mech. Min. "
@@ -171,17 +169,18 @@ def roughness_coefficient(
             slopes[i], lags[i] = lines.slope, lines.lag
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / lines.lag)))
             intervals[i], coefficient[i] = fitted.interval, _coefficient(fitted, lines.slope)
-            if lines.of_profiles.size >= FEWEST_PROFILES:  # JRC grows with Z2: the quantiles correspond
+            # JRC grows with Z2: the quantiles correspond. Below 20 profiles the low one is beyond all but one
+            if lines.of_profiles.size >= 20:
                 limits[:, i] = _coefficient(fitted, np.quantile(lines.of_profiles, (0.025, 0.975)))
             expected = f"heights {interval:g} m apart towards {towards.name}"
             problems.require(math.isfinite(slopes[i]), "surface", expected, NONE)
-    position = np.where(coefficient > LARGEST_JRC, ABOVE, np.where(coefficient < 0, BELOW, INSIDE))
+    position = (coefficient > LARGEST_JRC).astype(np.int8) - (coefficient < 0)
     limits[:, ~np.isfinite(limits).all(axis=0)] = np.nan
     variables = {
         "roughness_coefficient": np.where(np.isfinite(coefficient), coefficient, np.nan),
         "roughness_coefficient_low": limits[0],
         "roughness_coefficient_high": limits[1],
-        "scale_position": position.astype(np.int8),
+        "scale_position": position,  # -1 below, 1 above
         "profile_slope": slopes,
         "lag": lags,
         "regression_interval": intervals,
@@ -215,12 +214,15 @@ def _coefficient(law: Regression, slope: Any) -> Any:
         return law.offset + law.factor * (np.log10(slope) if law.power is None else slope**law.power)
 
 
-def _add_notes(result: xr.Dataset) -> None:
-    """Say which values are extrapolated, and where the lag is not that of the regression."""
+def _add_notes(result: xr.Dataset, tolerance: float = 0.1) -> None:
+    """Say which values are extrapolated, and where the lag is not that of the regression.
+
+    At H = 0.7 a lag that is off by the tolerance changes the result by 0.4.
+    """
     comments = []
-    if (result["scale_position"] != INSIDE).any():
+    if result["scale_position"].any():
         comments.append(OUTSIDE)
-    off = np.abs(result["lag"].values / result["regression_interval"].values - 1.0) > LAG_TOLERANCE
+    off = np.abs(result["lag"].values / result["regression_interval"].values - 1.0) > tolerance
     if off.any():
         comments.append("the lag in use is not the sampling interval of the regression")
     if comments:

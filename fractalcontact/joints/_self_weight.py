@@ -18,7 +18,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._dilatancy import rigid_dilatancies
-from fractalcontact.joints._friction import LOCKED, LOCKED_ANGLE
+from fractalcontact.joints._friction import LOCKED
 from fractalcontact.joints._sheared_contact import (
     PRESSING_BYTES,
     Pressing,
@@ -150,7 +150,7 @@ def self_weight(
             "achieved_residual": float(columns["residual"].max()),
         }
     angle = crack.basic_friction_angle + np.degrees(np.arctan(opening / shears[:, None]))
-    strength = pressures * np.tan(np.radians(np.where(angle < LOCKED_ANGLE, angle, math.nan)))
+    strength = pressures * np.tan(np.radians(np.where(angle < 90.0, angle, math.nan)))
     exponents = [_exponent(sizes, row) for row in strength.reshape(-1, sizes.size)]
     variables |= {
         "dilatancy": (dims, opening),

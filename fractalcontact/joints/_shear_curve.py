@@ -18,8 +18,6 @@ from fractalcontact.joints._criteria import LARGEST_ANGLE, POSITIVE, SAMPLE_LENG
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 from fractalcontact.joints._strength_envelope import OUTSIDE
 
-# displacement at the peak over the length, as of JRC = 1e-5: a plane has none of its own
-SMALLEST_PEAK = 1e-4
 SMOOTH = "the surface has no roughness on the scale of standard profiles: JRC is below 0"
 
 
@@ -29,9 +27,8 @@ def _check(problems: Problems) -> None:
         ascending = bool((np.diff(float_array(given.displacement)) > 0).all())
         problems.require(ascending, "displacement", "ascending values")
     problems.numbers("nominal_pressure", **POSITIVE)
-    problems.number("residual_friction_angle", above=0, below=LARGEST_ANGLE)
-    _criteria.check_quantities(problems, "wall_strength", "length")
-    _criteria.check_quantities(problems, "roughness_coefficient", optional=True)
+    required = ("wall_strength", "residual_friction_angle", "length")
+    _criteria.check_quantities(problems, *required, residual_friction_angle={"below": LARGEST_ANGLE})
     problems.number("damage_coefficient", at_least=1, at_most=2, optional=True)
     problems.number("normal_stiffness", **POSITIVE, optional=True)
     _criteria.check_measured(problems, measured_coefficient)
@@ -124,7 +121,7 @@ def shear_curve(
         measured = measured_coefficient(surface, direction=direction)
         jrc_of_sample = measured["roughness_coefficient"].item()
     jrc, jcs, peak = _criteria.longer_joint(jrc_of_sample, float(wall_strength), float(length))
-    peak = max(peak, SMALLEST_PEAK * float(length))
+    peak = max(peak, 1e-4 * float(length))  # as of JRC = 1e-5: a plane has no displacement of its own
     given, pressures = float_array(displacement), float_array(nominal_pressure)
     residual = float(residual_friction_angle)
     stiffness = 0.0 if normal_stiffness is None else float(normal_stiffness)

@@ -51,8 +51,6 @@ LOADS = ("closure", "normal_force", "nominal_pressure")
 SOLVER = ("influence", "disc_radius", "hardness", "tolerance", "method")
 # bytes of a cell: the solver of a free body with the steps before (188), delta-surface and flat block
 PRESSING_BYTES = 228.0
-FORCE_ERROR = 1e-7  # relative error of the force that balances a spring; 1e-5 takes a tenth less time
-MAX_SOLUTIONS = 60  # for one such force: 189 of them took 6 in the median and 13 at most
 
 
 @dataclass(frozen=True)
@@ -279,7 +277,15 @@ def press_against_spring(
     return {name: np.stack([result[name] for result in results]) for name in results[0]}
 
 
-def _press_balanced(contact: ShearedContact, initial: float, opening: float, stiffness: float) -> Columns:
+def _press_balanced(
+    contact: ShearedContact,
+    initial: float,
+    opening: float,
+    stiffness: float,
+    *,
+    error: float = 1e-7,  # of the force, relative; 1e-5 takes a tenth less time
+    most: int = 60,  # solutions for one force: 189 of them took 6 in the median and 13 at most
+) -> Columns:
     """Press under the force that balances the spring; `opening` is that of the rigid faces, m."""
     from scipy.optimize import brentq
 
@@ -294,14 +300,14 @@ def _press_balanced(contact: ShearedContact, initial: float, opening: float, sti
         return press(0.0, contact.pressing.keep)
     at_initial = excess(initial) if initial > 0 else -stiffness * opening
     low, high = (initial, initial - at_initial) if at_initial < 0 else (0.0, initial)
-    if abs(at_initial) <= FORCE_ERROR * initial:
+    if abs(at_initial) <= error * initial:
         force = initial
     elif low > 0:  # the closure is nearly linear in the logarithm of the force
         ends = np.log(low), np.log(high)
-        log_force = brentq(lambda x: excess(np.exp(x)), *ends, xtol=FORCE_ERROR, maxiter=MAX_SOLUTIONS)
+        log_force = brentq(lambda x: excess(np.exp(x)), *ends, xtol=error, maxiter=most)
         force = np.exp(log_force)
     else:
-        force = brentq(excess, low, high, xtol=FORCE_ERROR * high, maxiter=MAX_SOLUTIONS)
+        force = brentq(excess, low, high, xtol=error * high, maxiter=most)
     return press(float(force), contact.pressing.keep)
 
 

@@ -27,11 +27,7 @@ from fractalcontact.joints._directional_roughness import directional_roughness
 from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
 
 WHERE = "fractalcontact.joints.strength_envelope"
-STRENGTH_RATIO = 10.0  # compressive over tensile strength n of a hard rock (Hoek and Bray 1981)
-OPTIONAL = (
-    "residual_friction_angle", "roughness_coefficient", "asperity_angle", "tensile_strength", "cohesion",
-    "length",
-)  # fmt: skip
+
 MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
 NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
 OUTSIDE = "outside the range of the criterion where in_range is False"
@@ -41,7 +37,6 @@ def _check(problems: Problems) -> None:
     given = problems.given
     problems.numbers("nominal_pressure", **POSITIVE)
     check_quantities(problems, "wall_strength", "basic_friction_angle")
-    check_quantities(problems, *OPTIONAL, optional=True)
     if given.criterion is None:
         expected = "heights, or an asperity_angle or roughness_coefficient in their place"
         problems.require(bool(_usable(vars(given))), "surface", expected)
@@ -175,7 +170,8 @@ def strength_envelope(
         roughness_coefficient=jrc.item() if roughness_coefficient is None else float(roughness_coefficient),
         asperity_angle=dip.item() if asperity_angle is None else float(asperity_angle),
         wall_strength=float(wall_strength),
-        tensile_strength=float(tensile_strength or wall_strength / STRENGTH_RATIO),
+        # of a hard rock (Hoek and Bray 1981)
+        tensile_strength=float(tensile_strength or wall_strength / 10.0),
         basic_angle=float(basic_friction_angle),
         residual_angle=float(residual_friction_angle or basic_friction_angle),
         cohesion=math.nan if cohesion is None else float(cohesion),

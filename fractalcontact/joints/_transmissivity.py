@@ -32,7 +32,6 @@ RESULTS = ("axis", "transmissivity", "hydraulic_aperture", "percolates", "residu
 NARROW = "cells open by less than 0.001 of the mean opening (narrow_fraction) count as closed"
 AXES = ("y", "x")
 MAPS = {"pressure": ("relative_pressure",), "flux": ("flux_x", "flux_y")}  # that can be kept
-ROUNDING = 1e-9  # relative to the largest opening: a smaller overlap is rounding
 
 
 def _check(problems: Problems) -> None:
@@ -127,7 +126,7 @@ def transmissivity(
     axes, kept = word_tuple(axis), word_tuple(keep)
     values = np.asarray(gap.values, dtype=np.float64)
     leading = tuple(str(dim) for dim in gap.dims[:-2])
-    rounding = ROUNDING * np.abs(values).max(axis=(-2, -1), keepdims=True)
+    rounding = 1e-9 * np.abs(values).max(axis=(-2, -1), keepdims=True)  # a smaller overlap is rounding
     (wraps_y, wraps_x), ratio = periodic_axes(periodic, grid), float(grid.spacing[0] / grid.spacing[1])
     wraps = wraps_y, wraps_x
     order = nested_dissection(grid.shape, wraps)

@@ -19,31 +19,25 @@ from fractalcontact.joints._flow_network import Held, Network
 from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
 
 WHERE = "fractalcontact.joints.uplift"
-EDGES = {"W": ("x", 0.0), "E": ("x", 1.0), "S": ("y", 0.0), "N": ("y", 1.0)}  # axis, share of its extent
+EDGES = {"W": ("x", False), "E": ("x", True), "S": ("y", False), "N": ("y", True)}  # axis, is at its far end
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
 LARGEST = 1e12  # Pa or m: far beyond water and dams; products do not overflow
-PRESSURE = {"at_least": 0, "at_most": LARGEST}
+
 BOUNDS: dict[str, dict[str, Any]] = {
     "upstream_pressure": {"above": 0, "at_most": LARGEST},
-    "downstream_pressure": PRESSURE,
-    "drain_pressure": PRESSURE | {"optional": True},
+    "downstream_pressure": {"at_least": 0, "at_most": LARGEST},
+    "drain_pressure": {"at_least": 0, "at_most": LARGEST, "optional": True},
     "drain_diameter": {"at_least": 0},
     "drain_share": {"at_least": 0, "at_most": 1},
     "normal_stiffness": {"at_least": 1e3, "optional": True},  # Pa/m: softer joints open by metres
     "total_stress": {"at_least": 1e-30, "at_most": LARGEST, "optional": True},
 }
-# change of the pressures that ends the iteration with the opening: it leaves an error of 5e-12
-BALANCE = 1e-10
-MAX_ITERATIONS = 500  # 24 rough joints of stiffnesses from 1e8 to 1e11 Pa/m took 41 at most
-RELAXATION = 0.7  # of the opening, halved where the pressures oscillate: one that closes a bottleneck, say
-SMALLEST_RELAXATION = 0.02  # of the opening; .01, .04 and .3 gave the same forces in as many iterations
+
 FORCES = ("uplift_force", "mean_uplift", "uplift_arm", "uplift_x", "uplift_y", "uplift_profile")
 ON_PATH = ("effective_stress", "balance_error")
 RESULTS = ("diagram", "fluid_pressure", "wet_fraction", "isolated_fraction", "residual", *FORCES, *ON_PATH,
            "iterations", "converged", "run_time")  # fmt: skip
-HELD = 1e7  # conductance to a drain or line over that between its cell and the next ones; 1e8 changes 2e-8
-PLACE_ERROR = 1e-9  # of the search between two steps of the path; 1e-7 and 1e-11 found the same place
-STRESS_BALANCE = 1e-4  # of the total stress: a single cell that opens takes up more than the solver's error
+
 NO_UPLIFT = "NaN where no water presses on the joint"
 OFF_THE_PATH = (
     "NaN where no effective stress on the path of the gap balances the total stress: the path ends too early "
@@ -258,8 +252,9 @@ def _sides(upstream: Any, downstream: Any, gap: xr.DataArray) -> tuple[Side, Sid
 def _side(value: Any, gap: xr.DataArray) -> Side:
     grid = read_grid(gap)
     if isinstance(value, str):
-        name, share = EDGES[value]
-        return Side("yx".index(name), share * grid.extent["yx".index(name)], True)
+        name, is_far = EDGES[value]
+        axis = "yx".index(name)
+        return Side(axis, grid.extent[axis] if is_far else 0.0, True)
     axis = "yx".index(value[0])
     spacing = grid.spacing[axis]
     cell = min(int(_from_edge(gap, axis, float(value[1])) / spacing), grid.shape[axis] - 1)
@@ -326,7 +321,8 @@ class HeldFlow:
 
     def _held(self, cells: Array) -> Held:
         held = _flow_network.nothing_held(cells.shape)
-        fixed = HELD * (self.ratio + 1.0 / self.ratio) * cells
+        # 1e7 times what is between a cell of a drain or line and the next ones; 1e8 changes 2e-8
+        fixed = 1e7 * (self.ratio + 1.0 / self.ratio) * cells
         held.add(self.is_drain, fixed[self.is_drain], self.drained)
         for side, pressure in zip(self.sides, (1.0, 0.0), strict=True):
             row = min(int(side.place / self.grid.spacing[side.axis]), cells.shape[side.axis] - 1)
@@ -363,17 +359,39 @@ class State(NamedTuple):
     balance_error: float = math.nan
 
 
-def _opened(gap: Array, flow: HeldFlow, soft: tuple[float, float] | None) -> State:
+def _opened(
+    gap: Array,
+    flow: HeldFlow,
+    soft: tuple[float, float] | None,
+    *,
+    balance: float = 1e-10,
+    max_iterations: int = 500,
+    relaxation: float = 0.7,
+    least_relaxation: float = 0.02,
+) -> State:
     """Return the pressure that belongs to the gap it opens.
 
-    `soft` is the opening (m) under the downstream pressure and that under the pressure difference.
+    Parameters
+    ----------
+    gap : ndarray, shape (ny, nx)
+        Without water, m.
+    flow : HeldFlow
+    soft : pair of float, optional
+        Opening (m) under the downstream pressure and that under the pressure difference; None: none.
+    balance : float
+        Change of the pressures that ends the iteration: it leaves an error of 5e-12.
+    max_iterations : int
+        24 rough joints of stiffnesses from 1e8 to 1e11 Pa/m took 41 at most.
+    relaxation, least_relaxation : float
+        Of the opening, halved where the pressures oscillate: one that closes a bottleneck, say. The least of
+        .01, .04 and .3 gave the same forces in as many iterations.
     """
     p, residual = flow.pressure(gap)
     isolated, is_known = _isolated(gap, p), residual <= ERROR
     if soft is None or not is_known:
         return State(p, residual, isolated, converged=is_known)
-    opened, relaxation, last = np.zeros_like(gap), RELAXATION, math.inf
-    for iteration in range(1, MAX_ITERATIONS + 1):
+    opened, last = np.zeros_like(gap), math.inf
+    for iteration in range(1, max_iterations + 1):
         wanted = np.where(np.isfinite(p), soft[0] + soft[1] * p, 0.0)
         opened += relaxation * (wanted - opened)
         previous = p
@@ -381,10 +399,10 @@ def _opened(gap: Array, flow: HeldFlow, soft: tuple[float, float] | None) -> Sta
         if residual > ERROR:
             break
         change = float(np.nanmax(np.abs(p - previous), initial=0.0))
-        if not change > BALANCE:
+        if not change > balance:
             return State(p, residual, isolated, iteration)
         if change > last:  # it oscillates
-            relaxation = max(0.5 * relaxation, SMALLEST_RELAXATION)
+            relaxation = max(0.5 * relaxation, least_relaxation)
         last = change
     return State(p, residual, isolated, iteration, converged=False)
 
@@ -408,7 +426,14 @@ def _on_path(gap: xr.DataArray, flow: HeldFlow, total: float, water: tuple[float
 
 
 def _balanced(
-    planes: Array, stresses: Array, flow: HeldFlow, total: float, water: tuple[float, float]
+    planes: Array,
+    stresses: Array,
+    flow: HeldFlow,
+    total: float,
+    water: tuple[float, float],
+    *,
+    place_error: float = 1e-9,  # in steps of the path; 1e-7 and 1e-11 found the same place
+    balance: float = 1e-4,  # of the total stress: a cell that opens takes up more than the solver's error
 ) -> State:
     """Return the state on a path of gaps at which effective stress and mean uplift make the total stress.
 
@@ -433,7 +458,7 @@ def _balanced(
         p, residual = flow.pressure(gap)
         uplift = float(np.nan_to_num(water[0] + water[1] * p).mean())
         error = (stress + uplift) / total - 1.0
-        balances = abs(error) <= STRESS_BALANCE and residual <= ERROR
+        balances = abs(error) <= balance and residual <= ERROR
         return State(p, residual, _isolated(gap, p), 0, balances, float(stress), error)
 
     place = float(len(stresses) - 1)  # as the search states it
@@ -442,7 +467,7 @@ def _balanced(
         place, above = place - 1, found
         found = state(place)
     if found.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
-        root = brentq(lambda at: state(at).balance_error, place, place + 1, xtol=PLACE_ERROR)
+        root = brentq(lambda at: state(at).balance_error, place, place + 1, xtol=place_error)
         return state(root)._replace(iterations=len(solved))
     found = found._replace(iterations=len(solved))
     if found.converged:

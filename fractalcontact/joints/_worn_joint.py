@@ -16,25 +16,12 @@ from fractalcontact.joints._delta_surface import heights_under
 from fractalcontact.joints._sheared_contact import Pressing, ShearedContact
 
 WHERE = "fractalcontact.joints.direct_shear"
-# relative error of the load on the contacts, and of the normal force; 1e-4 takes half more time and changes
-# the stresses by 5e-6
-LOAD_ERROR = 1e-3
-# for one such load: the bracket of .5 is then below 1e-6, and 1 - mu d at the solver's error
-MAX_SOLUTIONS = 40
-# of the normal force at the start: a spring may unload the block entirely; 1e-8 and 1e-4 gave the same
-SMALLEST_FORCE = 1e-6
-CAPACITY = 1.0 - 1e-9  # largest load over hardness times area; 1 - 1e-6 and 1 - 1e-12 gave the same bits
-# steps of the logarithm of the load, and its range below that of the step before; .25 and 1 changed the
-# stresses by 9e-6, 20 and 80 none
-BRACKET, LOWEST = 0.5, 40.0
+
 CRUSHED = "NaN from where the contacts would bear more than the hardness over the whole block"
 LOCKED = (
     "NaN from where the block locks: slopes of 90 degrees less the friction angle stop it until they yield, "
     "under a load on which the normal force no longer depends"
 )
-# the elastic stiffness is that of unloading to this share of the load: a definition, for .25 and .8 changed
-# it by 13 and 44 % on a rough crack
-UNLOADED = 0.5
 
 
 class State(NamedTuple):
@@ -72,7 +59,8 @@ class WornJoint:
         crack, options = pressing.crack, pressing.options
         lower, upper = crack.faces()
         self.crack, self.towards, self.pressing = crack, towards, pressing
-        self.capacity = CAPACITY * float(options.hardness or math.inf) * crack.nominal_area
+        # just below the hardness all over; 1 - 1e-6 and 1 - 1e-12 gave the same bits
+        self.capacity = (1.0 - 1e-9) * float(options.hardness or math.inf) * crack.nominal_area
         self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
         self.residual, self.steepest, self.plastic_work = 0.0, 0.0, 0.0
         self.unconverged = 0
@@ -133,17 +121,19 @@ class WornJoint:
         }
 
 
-def shear_stiffness(joint: WornJoint, position: float, load: float) -> float:
+def shear_stiffness(joint: WornJoint, position: float, load: float, unloaded: float = 0.5) -> float:
     """Return the elastic shear stiffness (Pa/m) in full stick, from the normal stiffness of unloading.
 
     Contacts that stick have the ratio 2 (1 - nu)/(2 - nu) of tangential to normal stiffness (Mindlin 1949).
+    It is that of unloading to a share of the load: a definition, for .25 and .8 changed it by 13 and 44 % on
+    a rough crack.
     """
     contact = joint.contact(position)
-    closed = [joint.press(contact, part * load).closure for part in (1.0, UNLOADED)]
+    closed = [joint.press(contact, part * load).closure for part in (1.0, unloaded)]
     nu, unloading = joint.crack.contact_poisson, closed[0] - closed[1]
     if unloading <= 0:
         return math.inf
-    stiffness = (1.0 - UNLOADED) * load / unloading / joint.crack.nominal_area
+    stiffness = (1.0 - unloaded) * load / unloading / joint.crack.nominal_area
     return 2.0 * (1.0 - nu) / (2.0 - nu) * stiffness
 
 
@@ -154,12 +144,36 @@ def balanced_step(
     start: float,
     friction: float,
     normal_force: Callable[[float], float],
+    *,
+    error: float = 1e-3,
+    most: int = 40,
+    bracket: float = 0.5,
+    reach: float = 40.0,
 ) -> ShearStep | str:
     """Move the block by one step and wear the faces; the reason if no load on the contacts balances.
 
     The load P on the contacts is that at which N = P (1 - mu d) is the normal force. The rise d falls as P
     grows, so that there is one such load. Where contacts yield all at once d jumps; the step is then the mean
     of those on both sides that has the normal force.
+
+    Parameters
+    ----------
+    here, there : float
+        Positions, m.
+    start : float
+        Load of the step before, N.
+    friction : float
+        Coefficient mu.
+    normal_force : callable
+        The normal force (N) at a height of the block (m).
+    error : float
+        Relative, of the load and of the normal force; 1e-4 takes half more time and changes the stresses by
+        5e-6.
+    most : int
+        Loads tried in the bracket, which is then below 1e-6, and 1 - mu d at the solver's error.
+    bracket, reach : float
+        Steps of the logarithm of the load, and how far it may fall below that of the start; .25 and 1 changed
+        the stresses by 9e-6, 20 and 80 not at all.
     """
 
     def excess(step: ShearStep) -> float:
@@ -172,24 +186,24 @@ def balanced_step(
     contacts = joint.contact(here, elastic=True), joint.contact(there)
     limit = math.log(joint.capacity)
     low = high = min(math.log(start), limit)
-    lowest = low - LOWEST
+    lowest = low - reach
     below = above = moved(low)
     while below[0] > 0 and low > lowest:
         high, above = low, below
-        low -= BRACKET
+        low -= bracket
         below = moved(low)
     while above[0] < 0 and high < limit:
         low, below = high, above
-        high = min(high + BRACKET, limit)
+        high = min(high + bracket, limit)
         above = moved(high)
     if below[0] > 0 or above[0] < 0:
         return CRUSHED
-    for turn in range(MAX_SOLUTIONS):
+    for turn in range(most):
         span = above[0] - below[0]
         share = above[0] / span if span > 0 else 0.0
         step: ShearStep = _mean(above[1], below[1], share)
-        is_narrow = high - low <= LOAD_ERROR or min(above[0], -below[0]) <= LOAD_ERROR
-        if is_narrow and abs(excess(step)) <= LOAD_ERROR:
+        is_narrow = high - low <= error or min(above[0], -below[0]) <= error
+        if is_narrow and abs(excess(step)) <= error:
             joint.wear(there, step.state)
             return step
         middle = high + (0.5 if turn % 2 else share) * (low - high)  # bisection and secant in turn

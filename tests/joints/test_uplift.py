@@ -7,7 +7,6 @@ from scipy.optimize import brentq
 
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
-from fractalcontact.joints import _uplift
 
 HEAD = 490.5e3  # Pa, 50 m of water
 
@@ -153,12 +152,11 @@ def test_a_total_stress_off_the_path_is_reported(make_face, total, sign):
     np.testing.assert_allclose(result.mean_uplift.sel(diagram="linear"), HEAD / 2, rtol=1e-12)
 
 
-def test_an_opening_that_does_not_converge_is_reported(make_face, monkeypatch):
-    monkeypatch.setattr(_uplift, "MAX_ITERATIONS", 15)
-    rng = np.random.default_rng(43)  # openings over five decades: the water closes and opens bottlenecks
-    gap = 10.0 ** rng.uniform(-8, -3, (20, 24))
+def test_an_opening_that_does_not_converge_is_reported(make_face):
+    rng = np.random.default_rng(0)  # openings over five decades: the water closes and opens bottlenecks
+    gap = 10.0 ** rng.uniform(-8, -3, (10, 12))
     gap[rng.random(gap.shape) < 0.2] = 0
-    options = {"normal_stiffness": 7.7e11, "drains": [(5.0, 5.0), (5.0, 15.0)]}
+    options = {"normal_stiffness": 1e10, "drains": [(5.0, 3.0)]}
     gaps = xr.concat([make_face(gap, 1.0), make_face(np.full(gap.shape, 1e-4), 1.0)], "step")
     with pytest.warns(ConvergenceWarning, match="step 0: opening and flow did not come to balance"):
         result = fc.joints.uplift(gaps, upstream_pressure=490e3, **options)
