@@ -127,6 +127,12 @@ def content(summary: Any) -> Any:
     return {name: content(value) for name, value in summary.items() if name != "provenance"}
 
 
+def differing(entry: Mapping[str, Any], arguments: Mapping[str, Any]) -> list[str]:
+    """Return the names of the arguments that a provenance states otherwise."""
+    stated = entry.get("parameters", {})
+    return [name for name in arguments if content(stated.get(name)) != content(plain(arguments[name]))]
+
+
 def checksum(values: np.ndarray[Any, Any]) -> str:
     """Return the SHA-256 of `values.tobytes()`, without a copy of the whole."""
     digest = hashlib.sha256()

@@ -189,7 +189,8 @@ def _join(links: Array) -> tuple[Array, Array, Array, Array, Array]:
     linked, places = np.unique(links[:, :2], return_inverse=True)
     parent, shift = np.arange(linked.size), np.zeros((linked.size, 2), np.int64)
     wraps = np.zeros((linked.size, 2), bool)
-    union_find(np.concatenate([places.reshape(-1, 2), links[:, 2:]], axis=1), parent, shift, wraps)
+    if linked.size:  # else the kernel is not compiled: .5 s
+        union_find(np.concatenate([places.reshape(-1, 2), links[:, 2:]], axis=1), parent, shift, wraps)
     is_root = parent == np.arange(linked.size)
     wrapping = is_root & wraps.any(1)
     return linked[~is_root], linked[parent[~is_root]], shift[~is_root], linked[wrapping], wraps[wrapping]

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from scipy.ndimage import binary_erosion
-from scipy.spatial import cKDTree
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.references import joined_references
+from fractalcontact.base.provenance import differing
+from fractalcontact.base.references import joined_references, provenance_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.threads import thread_count
 from fractalcontact.base.validation import Problems, word_tuple
@@ -26,6 +26,7 @@ LOADS = ("normal_force", "nominal_pressure", "closure")
 EVENTS = ("births", "deaths", "merges", "splits", "absorbed", "fragments")
 CHANGES = (*EVENTS, "overlap", "chance_overlap", "overlap_beyond_chance", "hausdorff_distance")
 RETURN_NAMES = ("return_step", "hysteresis", "coverage_change")
+OF_SIGNATURE = ("mask", "window", "along", "connectivity", "periodic", "valid")  # its arguments
 SAME_LOAD = 1e-6  # of the largest load: rounding of a path that comes back
 
 
@@ -33,6 +34,20 @@ def _check(problems: Problems) -> None:
     check_path(problems)
     check_window(problems, has_mask=not problems.messages)
     problems.choices("include", among=MEASURES)
+    _check_signature(problems)
+
+
+def _check_signature(problems: Problems) -> None:
+    """Check that `signature`, if any, is that of this mask with these options."""
+    given = problems.given
+    if given.signature is None or not isinstance(given.mask, xr.DataArray):
+        return
+    entry = provenance_of(given.signature) if isinstance(given.signature, xr.Dataset) else {}
+    others = differing(entry, {name: getattr(given, name) for name in OF_SIGNATURE})
+    is_signature = entry.get("call") == "fractalcontact.domains.signature"
+    expected = "a result of `domains.signature` for the same mask and options"
+    if problems.require(is_signature, "signature", expected):
+        problems.require(not others, "signature", expected, f"one with another {', '.join(others)}")
 
 
 @public_result(title="Evolution of a set", check=_check)
@@ -46,6 +61,7 @@ def evolution(
     connectivity: int = 1,
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
+    signature: xr.Dataset | None = None,
 ) -> xr.Dataset:
     """How a contact domain changes along a path: the signature of each state, and the changes between states.
 
@@ -63,6 +79,8 @@ def evolution(
         See `lineage`.
     window : (low, high), optional
         See `signature`.
+    signature : Dataset, optional
+        The result of `signature` for the same mask and options, if there is one; else it is computed.
 
     Returns
     -------
@@ -102,7 +120,9 @@ def evolution(
     components = label_planes(planes, connectivity)
     path = Path.of(planes, along, frame)
     measurements = measure_planes(planes, wanted, components, connectivity)
-    measurements.add_dataset(_signature.analyse(planes, components, window=window, along=along))
+    if signature is None:
+        signature = _signature.analyse(planes, components, window=window, along=along)
+    measurements.add_dataset(signature)
     _add_changes(measurements, components, path)
     _add_returns(measurements, path)
     result = planes.dataset(measurements.variables, measurements.coords, notes=measurements.notes)
@@ -209,6 +229,8 @@ def hausdorff_distance(before: Array, after: Array, grid: Grid) -> float:
 
 def _directed_distance(start: Array, goal: Array, grid: Grid) -> float:
     """Largest distance from a cell of `start` to the nearest of `goal`, between centres."""
+    from scipy.spatial import cKDTree  # loads slowly
+
     outside = (start > 0) & (goal == 0)
     if not outside.any():
         return 0.0

@@ -25,7 +25,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.numbers import Array, number_of_entries
 from fractalcontact.base.progress import track
-from fractalcontact.base.provenance import content, plain
+from fractalcontact.base.provenance import differing
 from fractalcontact.base.references import PAPER, joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
@@ -318,12 +318,10 @@ def check_pressed(problems: Problems) -> None:
         return
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
     entry = provenance_of(given.pressed) if isinstance(given.pressed, xr.Dataset) else {}
-    stated = entry.get("parameters", {})
-    wanted = {name: getattr(given, name) for name in ("crack", "bulk", *SOLVER)}
-    differing = [name for name in wanted if content(stated.get(name)) != content(plain(wanted[name]))]
+    others = differing(entry, {name: getattr(given, name) for name in ("crack", "bulk", *SOLVER)})
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
     if problems.require(is_closure, "pressed", expected):
-        problems.require(not differing, "pressed", expected, f"one with another {', '.join(differing)}")
+        problems.require(not others, "pressed", expected, f"one with another {', '.join(others)}")
     problems.require(number_of_entries(given.keep) == 0, "pressed", "nothing beside `keep`")
 
 

@@ -13,6 +13,7 @@ FROM_SCENE = frozenset(
         "surface",
         "crack",
         "pressed",
+        "signature",
         "mask",
         "valid",
         "gap",

@@ -31,6 +31,7 @@ from fractalcontact.scenes._options import call_options, crack_options, stage_op
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stages import (
     CONTACT_MAPS,
+    SIGNATURE,
     STAGES,
     Stage,
     StageType,
@@ -172,8 +173,13 @@ def stage_work(
     if stage.reads_part:
         return works[stage.needs[0]]
     if stage.reads_map:
-        return StageWork((partial(map_reader(stage, scene), results[stage.needs[0]]),))
-    row, options = stage.row, call_options(scene, stage.row, stage.keep)
+        reader = map_reader(stage, scene)
+        if SIGNATURE in stage.needs:
+            options = {**reader.options, **_measured(scene, results, reader.options)}
+            reader = replace(reader, options=options)
+        return StageWork((partial(reader, results[stage.needs[0]]),))
+    row = stage.row
+    options = call_options(scene, row, stage.keep)
     if stage.name == "surfaces":
         return StageWork((partial(_lower_face, scene, faces.get("surface")),))
     if row.takes == "file":
@@ -246,6 +252,13 @@ def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict
     own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
     alike = own == other and "normal_force" in of_closure
     return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}
+
+
+def _measured(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict[str, xr.Dataset]:
+    """Return the signature as the argument of the evolution, where both have the same options."""
+    own = stage_options(scene, STAGES[SIGNATURE])
+    alike = all(own.get(key) == options.get(key) for key in STAGES[SIGNATURE].arguments())
+    return {"signature": results[SIGNATURE]} if alike else {}
 
 
 def _heights(results: Results, stage: str) -> xr.DataArray:

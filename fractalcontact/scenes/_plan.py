@@ -136,7 +136,7 @@ def _reasons(scene: Scene) -> dict[str, str]:
             reasons[row.name] = "figures are wanted" if row.for_figures else f"{word} is wanted"
     # from the last stage to the first, so that what a needed one needs is there too
     for row in reversed(tuple(STAGES.values())):
-        for need in row.needs if row.name in reasons and row.takes in ("map", "result") else ():
+        for need in row.needs[:1] if row.name in reasons and row.takes in ("map", "result") else ():
             *_, last = names = need.split(" or ")
             if reasons.keys().isdisjoint(names):
                 reasons[last] = row.why

@@ -20,7 +20,7 @@ from fractalcontact.scenes._scene import LOADS, PRESS, Scene
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
-PARTIAL_SLIP = "partial_slip"
+PARTIAL_SLIP, SIGNATURE = "partial_slip", "domains/signature"
 FIGURES = "figures"
 PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
 
@@ -35,7 +35,7 @@ class StageType:
         Group of its result, "joints/closure" for example.
     needs : tuple of str
         Stages whose results it takes, where the study has them; of "a or b" the first that the study has. A
-        stage that takes a map or a result brings the last of them into the study, if it has none.
+        stage that takes a map or a result brings the last of its first need into the study, if it has none.
     function : str
         The public function that computes it, for example "joints.closure".
     table : str
@@ -152,8 +152,8 @@ def _of_gap(name: str, rows: Rows) -> StageType:
     return _joint(name, rows, ("joints/closure",), takes="map", reads="gap", why=f"{name} needs the gap")
 
 
-def _domain(name: str, rows: Rows | None = None, **more: Any) -> StageType:
-    source = ("contact or joints/closure",)
+def _domain(name: str, rows: Rows | None = None, needs: tuple[str, ...] = (), **more: Any) -> StageType:
+    source = ("contact or joints/closure", *needs)
     table, why = f"domains.{name}", "the contact set is analysed"
     return StageType(
         f"domains/{name}", source, table, table, table, "map", why, reads="state", rows=rows, **more
@@ -294,7 +294,7 @@ _ROWS = (
     _domain("percolation", of_domain.percolation),
     _domain("hausdorff_content"),
     _domain("describe", of_domain.describe, whole_path=True),
-    _domain("evolution", of_domain.evolution, whole_path=True),
+    _domain("evolution", of_domain.evolution, (SIGNATURE,), whole_path=True),
     _domain("lineage", whole_path=True),
     StageType(FIGURES, (), "plotting.draw", takes="study"),
 )

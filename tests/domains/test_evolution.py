@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from domains.sets import as_mask, level_set, row_path
 from scipy.ndimage import distance_transform_edt
 
@@ -72,6 +73,24 @@ def test_overlap_of_nested_sets_is_their_area_ratio():
     assert result.overlap.values[1:] == pytest.approx(area[:-1] / area[1:])
     assert np.all(result.deaths.values[1:] == 0)
     assert np.all(result.splits.values[1:] == 0)
+
+
+def test_the_signature_that_is_there_is_taken():
+    planes = np.array([level_set(64, 0.8, c, np.random.default_rng(2)) for c in (0.1, 0.2)])
+    mask, options = as_mask(planes), {"window": (4e-3, 16e-3), "connectivity": 2}
+    signature = fc.domains.signature(mask, **options)
+    alone, shared = (fc.domains.evolution(mask, **options, signature=each) for each in (None, signature))
+    xr.testing.assert_identical(
+        *(each.drop_vars("run_time").drop_attrs(deep=False) for each in (alone, shared))
+    )
+    marked = signature.assign(gap_size=signature["gap_size"] + 1.0)
+    assert (fc.domains.evolution(mask, **options, signature=marked).gap_size == marked.gap_size).all()
+    others = {"connectivity": (mask, {"window": (4e-3, 16e-3)}), "mask": (mask[::-1], options)}
+    for name, (other, given) in others.items():
+        with pytest.raises(ValueError, match=f"signature: expected .*, got one with another {name}$"):
+            fc.domains.evolution(other, **given, signature=signature)
+    with pytest.raises(ValueError, match="signature: expected a result of `domains.signature`"):
+        fc.domains.evolution(mask, signature=alone)
 
 
 def test_earlier_leading_dims_are_separate_paths():

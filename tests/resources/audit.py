@@ -152,12 +152,12 @@ REQUIREMENTS = {
     "domains/boundary_dimension": Requirement(_SPECIAL, ("boundary",)),
     "domains/lacunarity": Requirement((), ("gliding boxes",)),
     "domains/islands": Requirement(_LABELS, ("islands",)),
-    "domains/percolation": Requirement(_LABELS, ("islands",)),
+    "domains/percolation": Requirement(_LABELS),  # islands that continue across edges take kernels
     "domains/describe": Requirement(_LABELS, OF_MASKS),
     "domains/evolution": Requirement((*_LABELS, "scipy.spatial"), OF_MASKS),
     "domains/signature": Requirement(_LABELS, ("islands", "gliding boxes")),
     "domains/hausdorff_content": Requirement((), ("quarters",)),
-    "domains/lineage": Requirement((*_LABELS, "scipy.spatial"), ("islands",)),
+    "domains/lineage": Requirement(_LABELS),
     FIGURES: Requirement(("matplotlib.figure", "matplotlib.backends.backend_agg")),
 }
 

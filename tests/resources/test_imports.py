@@ -97,7 +97,7 @@ COMPILED = {
     "dimension": {"dimensions": 6},
     "pressed": {"contact": 8},
     "closure": {"contact": 10},
-    "paper": {"dimensions": 7, "domains": 4, "contact": 10},
+    "paper": {"dimensions": 7, "domains": 3, "contact": 10},
 }
 
 

@@ -50,6 +50,7 @@ joints = [
 ]
 domains = [
     "box_dimension", "box_counts", "boundary_dimension", "lacunarity", "islands", "percolation", "evolution",
+    "signature",
 ]
 """
 # without three stages whose parts are those of one part each
