@@ -26,7 +26,6 @@ from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Units, marked, require_units
 
 MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
-NARROW = 2.0  # costs within this ratio are drawn on an axis of at least its width
 PLANE = ("method", "setting")
 MEASURED = ("error", "run_time", "memory", "on_pareto_front", "benchmark", "error_meaning")
 COSTS = {"run_time": "", "memory": "peak memory"}  # with their names on axes
@@ -90,15 +89,20 @@ def error_against_time(measured: Any, *, units: Units | None = None, axes: Panel
                 panel.line(
                     f"{method}, Pareto front", x.values[i][best], y.values[i][best], **own | {"ls": ""}
                 )
-            least, most = np.nanmin(x.shown), np.nanmax(x.shown)
-            if least > 0 and most < NARROW * least:  # nearly equal costs must not look different
-                ax.set_xlim(least / NARROW, most * NARROW)
+            _widen(ax, x.shown)
             panel.finish(log="xy", legend=cost == "memory")
         row[1].set_ylabel("")
         row[1].tick_params(labelleft=False)
         meaning = textwrap.fill(str(words(data["error_meaning"])[0]), 68)
         row[0].set_title(f"{name}\n{meaning}", fontsize="small")
     return shown
+
+
+def _widen(ax: Axes, costs: Any, ratio: float = 2.0) -> None:
+    """Show costs within this ratio on an axis at least as wide: nearly equal ones must not look different."""
+    least, most = np.nanmin(costs), np.nanmax(costs)
+    if least > 0 and most < ratio * least:
+        ax.set_xlim(least / ratio, most * ratio)
 
 
 def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:

@@ -23,7 +23,6 @@ from fractalcontact.plotting._style import Axes, AxesArray, Figure
 from fractalcontact.plotting._units import PER_LENGTH, Quantity
 
 A4 = (8.27, 11.69)  # inches
-COLUMNS, MOST_LINES = 165, 17  # of the text of the limits: what fits into its row in 6.5 points
 FLOW = Scale(1.0, "m³")  # transmissivities span decades: no prefix suits them all
 # what a consultant has to answer for, with its symbol and its unit
 INPUTS = {
@@ -39,7 +38,6 @@ ROUGHNESS = ("roughness_coefficient", "directional_roughness")
 GROUPS = (
     "strength_envelope", "direct_shear", "shear_curve", "closure", "closure_laws", "transmissivity",
 )  # fmt: skip
-MOST_SHEARS = 4  # with a line about their closure: what the column has room for beside all else
 
 
 @checked
@@ -127,9 +125,9 @@ def _draw_page(
         _flow_panels(parts[3], groups["closure"], groups["closure_laws"], groups["transmissivity"]),
         strict=True,
     )
-    lines = list(_limits(groups, notes))
+    lines = list(_limits(groups, notes))[:17]  # what fits into the row
     parts[4].text(0.03, 0.95, "Limits of validity", size=9, weight="bold", va="top")
-    parts[4].text(0.03, 0.86, "\n".join(lines[:MOST_LINES]), size=6.5, va="top", linespacing=1.35)
+    parts[4].text(0.03, 0.86, "\n".join(lines), size=6.5, va="top", linespacing=1.35)
     return panels
 
 
@@ -224,8 +222,11 @@ def _uplift_lines(water: xr.Dataset) -> Iterator[str]:
         yield f"  {place}{quantity_text(joint, 'N')}{share}" if np.isfinite(joint) else f"  {place}no balance"
 
 
-def _closure_lines(laws: xr.Dataset | None) -> Iterator[str]:
-    """Yield a line for each of a few shears: the law that its closures prefer, with its constants."""
+def _closure_lines(laws: xr.Dataset | None, most: int = 4) -> Iterator[str]:
+    """Yield a line for each of a few shears: the law that its closures prefer, with its constants.
+
+    The column has room for `most` of them beside all else.
+    """
     if laws is None:
         return
     seat = "from first touch"
@@ -236,7 +237,7 @@ def _closure_lines(laws: xr.Dataset | None) -> Iterator[str]:
     every = laws if "shear" in laws.dims else laws.expand_dims("shear")
     meanings = str(laws["preferred_law"].attrs["flag_meanings"]).split()
     shears = by_shear(every)
-    for i in _style.spread_indices(every.sizes["shear"], MOST_SHEARS):
+    for i in _style.spread_indices(every.sizes["shear"], most):
         law = every.isel(shear=i).squeeze()
         name = meanings[int(law["preferred_law"])]
         shear = f"v = {shears.labels[i]} {shears.unit}: " if shears.labels else ""
@@ -337,7 +338,7 @@ def _limits(groups: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Itera
             None
         )
     for text in texts:
-        yield from textwrap.wrap(f"- {text}", COLUMNS, subsequent_indent="  ")
+        yield from textwrap.wrap(f"- {text}", 165, subsequent_indent="  ")  # the page, in 6.5 points
 
 
 def _criteria(envelope: xr.Dataset) -> Iterator[str]:

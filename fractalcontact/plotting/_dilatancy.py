@@ -14,8 +14,6 @@ from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel,
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units
 
-ON_AXIS = 0.005  # of the height of the axes: a line that rises by less lies on the axis of a level face
-
 
 @figure
 def dilatancy(
@@ -69,7 +67,8 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     if "mean_slope" in data:
         ends = np.array([0.0, np.nanmax(panel.x.values)])
         rise = table(data, "mean_slope", dims[:1])[:, None] * ends
-        if np.nanmax(np.abs(rise), initial=0.0) > ON_AXIS * np.nanmax(panel.y.values, initial=0.0):
+        height = np.nanmax(panel.y.values, initial=0.0)
+        if np.nanmax(np.abs(rise), initial=0.0) > 0.005 * height:  # less lies on the axis, of a level face
             panel.curves("mean slope", rise, ends, key="mean slope", **_style.DOTTED)
     return panel.finish()
 

@@ -34,9 +34,7 @@ CURVES = {
     "covering_area": (1.0, 0.0, -1.0),
     "covering_length": (1.0, 0.0, -1.0),
 }
-NARROW = 0.1  # the axis of dimensions is at least this long: nearly equal ones must not look different
 ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
-CLIPPED = 10  # per cent of the local slopes at either end that may lie outside the axis
 
 
 @figure
@@ -150,11 +148,14 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     upper.tick_params(labelbottom=False)
 
 
-def _slope_limits(ax: Axes, slopes: Any) -> None:
-    """Limit the axis so that noise at the ends of a curve does not compress the rest."""
+def _slope_limits(ax: Axes, slopes: Any, clipped: float = 10.0) -> None:
+    """Limit the axis so that noise at the ends of a curve does not compress the rest.
+
+    So many per cent of the slopes at either end may lie outside it.
+    """
     finite = slopes[np.isfinite(slopes)]
     if finite.size:
-        low, high = np.percentile(finite, (CLIPPED, 100 - CLIPPED))
+        low, high = np.percentile(finite, (clipped, 100 - clipped))
         margin = max(0.4 * (high - low), 0.05)
         ax.set_ylim(low - margin, high + margin)
 
@@ -257,7 +258,8 @@ def dimensions(
     if truth is not None:
         panel.place(truth, key="true", color=_style.ink(), **_style.DOTTED)
     low_end, high_end = panel.ax.get_xlim()
-    wider = max(NARROW - (high_end - low_end), 0.0) / 2
+    # at least .1 long: nearly equal dimensions must not look different
+    wider = max(0.1 - (high_end - low_end), 0.0) / 2
     panel.ax.set_xlim(low_end - wider, high_end + wider)
     panel.ax.set_yticks(rows, [name.replace("_", " ") for name in methods])
     panel.ax.set_ylim(-0.6, len(methods) - 0.4)
@@ -266,7 +268,6 @@ def dimensions(
     return panel.finish(empty="")
 
 
-LOWEST, HIGHEST = -1.5, 2.5  # exponents on the axis
 WINDOW = ("window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale_max")
 
 
@@ -310,7 +311,6 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     for limit in (0.0, 1.0):
         panel.level(limit, color=_style.grey(), lw=0.7, ls=":")
     panel.ax.set_xscale("log")
-    bottom, top = np.fmin.reduce(low, initial=HIGHEST), np.fmax.reduce(high, initial=LOWEST)
-    if bottom < top:
-        panel.ax.set_ylim(max(LOWEST, float(bottom) - 0.1), min(HIGHEST, float(top) + 0.1))
+    bottom, top = panel.ax.get_ylim()
+    panel.ax.set_ylim(max(bottom, -1.5), min(top, 2.5))  # far beyond 0 and 1 an exponent says no more
     return panel.finish(log="x")

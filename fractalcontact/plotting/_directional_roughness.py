@@ -13,7 +13,6 @@ from fractalcontact.plotting._inputs import require_dims, result_of
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Units, scale_of
 
-RINGS = 4  # at most, so that their labels stay apart
 COMPASS = ("E", "45°", "N", "135°", "W", "225°", "S", "315°")
 CURVES: dict[str, tuple[str, dict[str, Any]]] = {
     "roughness_metric": ("$\\theta^*_{max}/(C+1)$", {"color": _style.BLUE, "ls": "-"}),
@@ -60,7 +59,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
         polar.plot(np.radians(azimuth[order]), angle(data[name].values[order]), label=label, **style)
     greatest = float(np.nan_to_num([float(angle(data[name].max())) for name in CURVES]).max())
     polar.set_ylim(0.0, 1.12 * greatest or 1.0)
-    rings = np.asarray(MaxNLocator(RINGS).tick_values(0.0, polar.get_ylim()[1]))
+    rings = np.asarray(MaxNLocator(4).tick_values(0.0, polar.get_ylim()[1]))  # labels of 4 stay apart
     polar.set_rticks(rings[(rings > 0) & (rings <= polar.get_ylim()[1])])
     polar.set_thetagrids(np.arange(0, 360, 45), COMPASS)
     polar.yaxis.set_major_formatter("{x:g}" + (angle.unit if angle.unit == "°" else f" {angle.unit}"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -40,8 +41,6 @@ Drawing = Callable[..., Any]  # of the data and of what stands beside them; retu
 WHERE = "fc.plotting.draw"
 FORMATS = ("png", "svg", "pdf", "csv")
 SOFTWARE = {"Software": "fractalcontact"}  # of a PNG file: a run overwrites no picture of others
-MAPS = 6  # of contact domains along a path
-LARGE = 1 << 26  # bytes of a study whose figures are drawn one after the other: two at once take more memory
 
 
 def _surface(data: xr.Dataset, delta: xr.Dataset | None = None) -> Any:
@@ -57,7 +56,8 @@ def _joint_closure(data: xr.Dataset) -> Any:
     """Draw the closure laws, with the steps marked whose maps `joint_contact_domains` shows."""
     every = data.expand_dims([dim for dim in ("shear", "step") if dim not in data.dims])
     shear = _middle_shear(data)
-    steps = loaded_steps(at_shear(every, shear), MAPS) if "state" in data else ()
+    maps = inspect.signature(contact_domains).parameters["panels"].default
+    steps = loaded_steps(at_shear(every, shear), maps) if "state" in data else ()
     return closure_laws(data, shear=shear, marked=steps)
 
 
@@ -249,7 +249,8 @@ def _draw_all(tree: xr.DataTree, folder: Path, progress: bool, formats: Sequence
 
     import matplotlib.backends.backend_agg  # before the process is copied  # noqa: F401
 
-    small = sum(node.nbytes for node in tree.subtree) < LARGE
+    # in bytes: of a larger study one after the other, since two figures at once take more memory
+    small = sum(node.nbytes for node in tree.subtree) < 1 << 26
     drawn = calls_in_two_processes(draw_one, len(rows)) if small else map(draw_one, range(len(rows)))
     for _ in track(drawn, progress, "figures", unit="figure", total=len(rows)):
         pass

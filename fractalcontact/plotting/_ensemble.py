@@ -15,15 +15,13 @@ from fractalcontact.plotting import _style
 from fractalcontact.plotting._line_panel import BAND_OPACITY
 from fractalcontact.plotting._style import Axes
 
-MEDIAN, BAND = 0.5, (0.16, 0.84)  # the band of one standard deviation to either side, if normal
-
 
 def reduced_trees(tree: xr.DataTree) -> list[xr.DataTree]:
     """Return the median of every curve over the members, and both ends of the band.
 
-    Maps and flags are those of member 0.
+    The band is one standard deviation to either side, if normal. Maps and flags are those of member 0.
     """
-    shares = (MEDIAN, *BAND)
+    shares = (0.5, 0.16, 0.84)
     return [tree.map_over_datasets(functools.partial(_quantile, share=share)) for share in shares]
 
 

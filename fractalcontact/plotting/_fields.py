@@ -16,9 +16,6 @@ from fractalcontact.plotting._paths import PATH, at_shear, load_of, select_path,
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Units, name_of
 
-ZOOM = 1 / 6  # edge of the magnified window over the shorter side
-POINTS = 1.0  # of a screen: a map whose cells are narrower is magnified
-
 
 @figure
 def contact_domains(
@@ -123,7 +120,8 @@ def _window(state: xr.DataArray, zoom: float | None, axes: Panels | None, width:
     if zoom is None:
         if _style.are_given(axes):
             return None
-        zoom = min(shape) * cell * ZOOM if 72 * width < POINTS * shape[1] else 0.0
+        # cells narrower than a typographic point cannot be told apart
+        zoom = min(shape) * cell / 6 if 72 * width < shape[1] else 0.0
     size = round(min(zoom, extent[1] - extent[0]) / cell)
     if size < 1 or size >= min(shape):
         return None

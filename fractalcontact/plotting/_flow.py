@@ -16,9 +16,6 @@ from fractalcontact.plotting._paths import PATH, path_axis
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, scale_of
 
-# three times as broad as a curve and pale, so that it is seen where the hydraulic aperture lies on it
-MEAN_LINE: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", "zorder": 1.5}
-
 
 @figure
 def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
@@ -52,7 +49,9 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
         name = f"along {axes[i]}" if axes else "flow"
         panel.curves(name, values, key=name if axes else "", ls=_style.LINES[i % 2])
     if "aperture" in data:
-        panel.curves("mean gap", "aperture", key="mean gap", marker="", **MEAN_LINE)
+        # three times as broad as a curve and pale, so that it is seen where the hydraulic aperture lies on it
+        broad: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", "zorder": 1.5}
+        panel.curves("mean gap", "aperture", key="mean gap", marker="", **broad)
     return panel.finish(log="x" if _style.needs_log_axis(x.values) else "", zero="y", title="flow")
 
 

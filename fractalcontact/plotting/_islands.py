@@ -158,8 +158,6 @@ def lineage(
 
 Array = np.ndarray[Any, np.dtype[Any]]
 LARGEST = 20  # islands of the last state with a colour of their own: more could not be told apart
-BAR = 0.08  # half the width of a bar, over the distance of two states
-THIN = 0.01  # of the axis: a bar that is lower has no edge, which would hide it
 BEND = np.linspace(0.0, 1.0, 24)  # along a ribbon: smooth at the size of a printed figure
 COLUMNS = ("island_before", "island_after", "common_cells", "cells_before", "cells_after", "link_step")
 
@@ -218,20 +216,7 @@ def alluvial(
     links = [path.isel(link=np.flatnonzero(of_link == step)) for step in steps.tolist()]
     ax = _style.axes_or_new(ax, _style.PANEL)
     stacks = _stacks(links)
-    from matplotlib.collections import PolyCollection
-
-    colours = np.array([*map(_rgb, _style.sequence_colours(LARGEST)[::-1]), _rgb(_style.tone(0.3))])
-    tallest = max((stack.cells.sum() for stack in stacks), default=0)
-    for place, stack in enumerate(stacks):
-        x = place + BAR * np.array([-1, 1, 1, -1])
-        y = stack.low[:, None] + stack.cells[:, None] * np.array([0, 0, 1, 1])
-        bars = PolyCollection(_shapes(x, y), facecolors=colours[stack.colour])
-        bars.set(edgecolor=_style.tone(0.0), linewidths=np.where(stack.cells > THIN * tallest, 0.4, 0.0))
-        ax.add_collection(bars)
-    for place, (each, before, after) in enumerate(zip(links, stacks, stacks[1:], strict=False)):
-        x = place + BAR + (1 - 2 * BAR) * np.concatenate([BEND, BEND[::-1]])
-        edges, colour = _ribbons(each, before, after)
-        ax.add_collection(PolyCollection(_shapes(x, edges), facecolors=colours[colour], alpha=0.45, lw=0))
+    _draw_stacks(ax, links, stacks)
     texts = [str(place) for place in range(len(stacks))]
     name = load_of(path) if "step" in path.dims else ""
     if name:
@@ -249,10 +234,25 @@ def alluvial(
     return ax
 
 
-def _rgb(colour: Any) -> tuple[float, float, float]:
+def _draw_stacks(ax: Axes, links: list[xr.Dataset], stacks: list[Stack], half: float = 0.08) -> None:
+    """Draw the bars of all states, of so much half the width over their distance, and the ribbons between."""
+    from matplotlib.collections import PolyCollection
     from matplotlib.colors import to_rgb
 
-    return to_rgb(colour)
+    named = [*_style.sequence_colours(LARGEST)[::-1], _style.tone(0.3)]
+    colours = np.array([to_rgb(colour) for colour in named])
+    tallest = max((stack.cells.sum() for stack in stacks), default=0)
+    for place, stack in enumerate(stacks):
+        x = place + half * np.array([-1, 1, 1, -1])
+        y = stack.low[:, None] + stack.cells[:, None] * np.array([0, 0, 1, 1])
+        edge = np.where(stack.cells > 0.01 * tallest, 0.4, 0.0)  # which would hide a lower bar
+        bars = PolyCollection(_shapes(x, y), facecolors=colours[stack.colour])
+        bars.set(edgecolor=_style.tone(0.0), linewidths=edge)
+        ax.add_collection(bars)
+    for place, (each, before, after) in enumerate(zip(links, stacks, stacks[1:], strict=False)):
+        x = place + half + (1 - 2 * half) * np.concatenate([BEND, BEND[::-1]])
+        edges, colour = _ribbons(each, before, after)
+        ax.add_collection(PolyCollection(_shapes(x, edges), facecolors=colours[colour], alpha=0.45, lw=0))
 
 
 def _shapes(x: Array, y: Array) -> Any:

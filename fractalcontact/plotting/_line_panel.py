@@ -18,9 +18,7 @@ from fractalcontact.plotting._units import Quantity
 
 Array = np.ndarray[Any, np.dtype[Any]]
 Styles = Sequence[dict[str, Any]]
-LETTER = 14.0  # points, diameter of the circle around a letter of half that size
 LETTER_NAME = "letter of a marked point"
-LEGEND_WIDTH = 24  # characters: of the size of legends 1.35 inches, a quarter of a panel with its legend
 BAND_OPACITY = 0.14  # of an interval under its curve: five on top of each other hide half of what is below
 
 
@@ -174,8 +172,8 @@ class LinePanel:
         if key:
             self.key(key, **style)
 
-    def mark(self, x: Any, y: Any, colour: Any, first: int = 0) -> None:
-        """Mark points of a curve with circled letters, beginning with letter number `first`.
+    def mark(self, x: Any, y: Any, colour: Any, first: int = 0, size: float = 14.0) -> None:
+        """Mark points of a curve with letters in circles of `size` points, from letter number `first` on.
 
         A letter is centred on its point, so that none covers another curve, or above it where another is.
         """
@@ -188,22 +186,23 @@ class LinePanel:
             if not (np.isfinite(a) and np.isfinite(b)):
                 continue
             point, lift = 72 * to_points.transform((a, b)), 0.0
-            while any(math.hypot(point[0] - x0, point[1] + lift - y0) < LETTER for x0, y0 in placed):
-                lift += LETTER
+            while any(math.hypot(point[0] - x0, point[1] + lift - y0) < size for x0, y0 in placed):
+                lift += size
             placed.append((point[0], point[1] + lift))
             circle = {"boxstyle": "circle,pad=0.25", "fc": ax.get_facecolor(), "ec": colour, "lw": 1.2}
             leader = {"arrowstyle": "-", "color": colour} if lift else None
             text = ax.annotate(_style.letter(number), (a, b), (0.0, lift), textcoords="offset points",
-                               size=LETTER / 2, weight="bold", ha="center", va="center_baseline", zorder=5,
+                               size=size / 2, weight="bold", ha="center", va="center_baseline", zorder=5,
                                annotation_clip=False, bbox=circle, arrowprops=leader)  # fmt: skip
             text.set_gid(LETTER_NAME)
             text.set_in_layout(False)
 
     def key(self, label: str, **style: Any) -> None:
-        """Add an entry to the legend of the kinds of curves, on lines of a legend's width."""
-        text = (
-            label if "$" in label else textwrap.fill(label, LEGEND_WIDTH)
-        )  # symbols are shorter than written
+        """Add an entry to the legend of the kinds of curves, on lines of a legend's width.
+
+        Its 24 characters are 1.35 inches in the size of legends, a quarter of a panel with its legend.
+        """
+        text = label if "$" in label else textwrap.fill(label, 24)  # symbols are shorter than written
         self.entries.append(_style.legend_line(text, **style))
 
     def area_key(self, label: str, **style: Any) -> None:

@@ -16,21 +16,14 @@ from fractalcontact.plotting._units import Quantity, Units, label_axis, name_of,
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-MOST_CELLS = 1600  # along an edge, a finer plane is averaged first: a map in a file has 700 points
-SHADED_SLOPE = 0.5  # rms slope after the exaggeration of the shading
-SHADING = 0.9  # change of brightness from no light to full light
-CLIPPED = 0.2  # per cent of the values at either end that may lie outside the colour bar
-CLIPPED_POSITIVE = 1.0  # the same of pressures and gaps, whose tails are longer
-TAIL = 0.25  # a tail that adds less than this share of the range is shown, one that adds more is cut
-PALETTE = 12  # colours of neighbouring islands, which are told apart by a step of five
 STATES = {
     "state": (("open", "contact", "yielded"), _style.STATE_COLOURS),
     "slip_state": (("open", "stick", "slip"), _style.SLIP_COLOURS),
 }
 
 
-def block_means(plane: Array, most: int = MOST_CELLS) -> Array:
-    """Return means over blocks of cells, so that no edge has more than `most` cells."""
+def block_means(plane: Array, most: int = 1600) -> Array:
+    """Return means over blocks of cells, at most `most` along an edge: a map in a file has 700 points."""
     by, bx = (-(-n // most) for n in plane.shape)
     if by == bx == 1:
         return plane
@@ -39,15 +32,18 @@ def block_means(plane: Array, most: int = MOST_CELLS) -> Array:
     return means
 
 
-def colour_limits(values: Array, clipped: float = CLIPPED) -> tuple[float, float, str]:
-    """Return the ends of a colour scale, and which ends (`neither`, `min`, `max`, `both`) are exceeded."""
+def colour_limits(values: Array, clipped: float, tail: float = 0.25) -> tuple[float, float, str]:
+    """Return the ends of a colour scale, and which ends (`neither`, `min`, `max`, `both`) are exceeded.
+
+    Of the values `clipped` per cent at either end are cut, unless they widen the scale by less than `tail`.
+    """
     finite = values[np.isfinite(values)]
     if finite.size == 0:
         return 0.0, 1.0, "neither"
     lowest, highest = float(finite.min()), float(finite.max())
     low, high = (float(v) for v in np.percentile(finite, (clipped, 100 - clipped)))
-    low = lowest if low - lowest <= TAIL * (high - low) else low
-    high = highest if highest - high <= TAIL * (high - low) else high
+    low = lowest if low - lowest <= tail * (high - low) else low
+    high = highest if highest - high <= tail * (high - low) else high
     if not high > low:
         width = abs(high) * 1e-6 or 1.0
         return low - width, high + width, "neither"
@@ -65,7 +61,7 @@ def draw_values(
     missing: str = _style.MISSING,
     name: str = "",
     log: bool = False,
-    clipped: float = CLIPPED,
+    clipped: float = 0.2,
     readable: bool = False,
 ) -> None:
     """Draw a plane of numbers with a colour bar and labelled axes.
@@ -83,7 +79,7 @@ def draw_values(
     values = np.asarray(plane.values, dtype=float)
     values = block_means(np.where(values > 0, values, 0.0) if positive else values)
     if positive:
-        _, high, beyond = colour_limits(values[values > 0], CLIPPED_POSITIVE)
+        _, high, beyond = colour_limits(values[values > 0], 1.0)  # their tails are longer
         low, beyond = 0.0, "max" if beyond in ("max", "both") else "neither"
     else:
         low, high, beyond = colour_limits(values, clipped)
@@ -96,7 +92,8 @@ def draw_values(
     if shaded:
         spacing = (extent[3] - extent[2]) / filled.shape[0], (extent[1] - extent[0]) / filled.shape[1]
         light = _light(filled, spacing)
-        image = np.clip(image * (1.0 + SHADING * (light - light.mean()))[..., None], 0.0, 1.0)
+        # full light is .9 brighter than none
+        image = np.clip(image * (1.0 + 0.9 * (light - light.mean()))[..., None], 0.0, 1.0)
     if positive:
         image[values == 0] = to_rgb(_style.OPEN_COLOUR)
     image[is_missing] = to_rgb(missing)
@@ -136,8 +133,8 @@ def _edges(centres: Array, log: bool) -> Array:
     return np.exp(edges) if log else edges
 
 
-def _light(heights: Array, spacing: tuple[float, float]) -> Array:
-    """Return the illumination of each cell, 0 to 1, with slopes scaled to an rms of `SHADED_SLOPE`."""
+def _light(heights: Array, spacing: tuple[float, float], slope: float = 0.5) -> Array:
+    """Return the illumination of each cell, 0 to 1, with slopes scaled to an rms of `slope`."""
     from matplotlib.colors import LightSource
 
     source = LightSource(azdeg=315, altdeg=45)
@@ -146,7 +143,7 @@ def _light(heights: Array, spacing: tuple[float, float]) -> Array:
     if not steep > 0 or not np.isfinite(steep):
         return np.ones(heights.shape)
     # row 0 is the south edge, whereas LightSource counts rows from the north
-    normal = np.stack([-slopes[1], -slopes[0]], axis=-1) * (SHADED_SLOPE / steep)
+    normal = np.stack([-slopes[1], -slopes[0]], axis=-1) * (slope / steep)
     lit = (normal @ source.direction[:2] + source.direction[2]) / np.sqrt(1 + (normal**2).sum(axis=-1))
     clipped: Array = np.clip(np.asarray(lit), 0.0, 1.0)
     return clipped
@@ -165,18 +162,18 @@ def draw_flags(ax: Axes, plane: xr.DataArray) -> None:
     _style.draw_frame(ax, _style.grey())
 
 
-def draw_labels(ax: Axes, plane: xr.DataArray) -> None:
-    """Draw the labels of islands, neighbouring islands in different colours."""
+def draw_labels(ax: Axes, plane: xr.DataArray, count: int = 12) -> None:
+    """Draw the labels of islands in so many colours, neighbouring islands in different ones."""
     import matplotlib
 
     labels = np.asarray(plane.values).astype(np.int64)
-    hues = matplotlib.colormaps[_style.SEQUENCE_MAP](np.linspace(0, 0.9, PALETTE))[:, :3]
-    image = hues[(labels * 5) % PALETTE]  # consecutive labels are often neighbours and need unlike colours
+    hues = matplotlib.colormaps[_style.SEQUENCE_MAP](np.linspace(0, 0.9, count))[:, :3]
+    image = hues[(labels * 5) % count]  # consecutive labels are often neighbours and need unlike colours
     image[labels <= 0] = matplotlib.colors.to_rgb(_style.OPEN_COLOUR)
     draw_image(ax, image, plane)
     label_axes(ax, plane)
-    count = np.unique(labels[labels > 0]).size
-    ax.set_title(f"{count} island{'' if count == 1 else 's'}")
+    islands = np.unique(labels[labels > 0]).size
+    ax.set_title(f"{islands} island{'' if islands == 1 else 's'}")
 
 
 def draw_image(ax: Axes, image: Array, plane: xr.DataArray) -> None:

@@ -16,7 +16,6 @@ from fractalcontact.plotting._style import spread_indices
 from fractalcontact.plotting._units import PLAIN, Quantity, Units, name_of, number_texts, scale_of, shown_in
 
 PATH = ("shear", "step")
-SAME = 5e-3  # relative difference of equal loads: half a unit of the third digit, the last that a label has
 LOADS = {"tangential_force": "$Q$", "normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
 
@@ -74,7 +73,8 @@ def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
         if name not in state.variables:
             continue
         values = np.atleast_1d(state[name].values).ravel()
-        if values.size == 0 or np.ptp(values) > SAME * abs(values[0]):
+        # half a unit of the third digit, the last that the text has, is no difference
+        if values.size == 0 or np.ptp(values) > 5e-3 * abs(values[0]):
             continue
         scale = scale_of((state if path is None else path)[name])
         return f"{symbol} = {float(scale(values[0])):.3g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
@@ -166,7 +166,6 @@ def loaded_steps(path: xr.Dataset, most: int) -> list[int]:
     return sorted({int(steps[nearest(closure, target)]) for target in targets})
 
 
-JUMP = 4.0  # ratio of successive shears at which the evenly sampled part ends: a series by octaves has 2
 NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 
 
@@ -222,8 +221,11 @@ def direction_name(name: str) -> str:
     return NAMES.get(name, name if not name or name.isalpha() else f"{name}°")
 
 
-def evenly_sampled_reach(data: xr.Dataset) -> float:
-    """Return the shear at which the first, evenly sampled part of a curve ends."""
+def evenly_sampled_reach(data: xr.Dataset, jump: float = 4.0) -> float:
+    """Return the shear at which the first, evenly sampled part of a curve ends.
+
+    The next one is more than `jump` times as long; a series by octaves is sampled evenly.
+    """
     shears = np.sort(np.atleast_1d(data["shear"].values).astype(float))
-    jumps = [i for i in range(1, shears.size) if shears[i - 1] > 0 and shears[i] > JUMP * shears[i - 1]]
+    jumps = [i for i in range(1, shears.size) if shears[i - 1] > 0 and shears[i] > jump * shears[i - 1]]
     return float(shears[jumps[0] - 1 if jumps else -1])

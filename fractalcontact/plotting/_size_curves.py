@@ -28,8 +28,6 @@ from fractalcontact.plotting._units import Quantity, Units
 SIZES = ("box_length", "radius_length", "side", "box_size", "radius")
 IN_CELLS = ("box_size", "radius")
 CELLS = Scale(1.0, "cells")  # where a mask has no lengths
-TOLERANCE = 0.1  # beyond 0 or 2, up to which a local dimension is not mentioned: twice the margin of the axes
-STEEP = 1.5  # ratio of values above which the lacunarity is drawn on a logarithmic axis
 SPOTS = "random spots, equal area, number and perimeter"
 CELLS_NULL = "random null, equal coverage"
 # curve of a random null: its name and dim, and a and b of its local dimension a + b d ln(curve) / d ln(size)
@@ -91,7 +89,7 @@ def signature(
         panel.finish(log="x", empty="no contact")
         panel.ax.set_ylim(-0.05, 2.05)
         slopes = panel.y.values[np.isfinite(panel.y.values)]
-        beyond = slopes[(slopes < -TOLERANCE) | (slopes > 2 + TOLERANCE)]
+        beyond = slopes[(slopes < -0.1) | (slopes > 2.1)]  # by more than twice the margin of the axes
         if beyond.size:  # no dimension in a plane: the slope between counts of a few boxes
             ends = dict.fromkeys(f"{value:.2g}" for value in (beyond.min(), beyond.max()))
             note = f"outside the axes, of few boxes: {' to '.join(ends)}"
@@ -172,7 +170,7 @@ def lacunarity(
         return as_array(shown)
     for panel, _ in _size_curves(data, shear, normal_force, shown, ("lacunarity", ""), CELLS_NULL):
         finite = panel.y.values[np.isfinite(panel.y.values)]
-        steep = finite.size > 0 and finite.max() > STEEP * finite.min()
+        steep = finite.size > 0 and finite.max() > 1.5 * finite.min()  # else a linear axis has more labels
         panel.finish(log="xy" if steep else "x", empty="no contact")
     return as_array(shown)
 
@@ -225,7 +223,6 @@ def sizes_of(data: xr.Dataset, over: str) -> Quantity:
 
 DIMENSIONS = ("box_dimension", "minkowski_dimension", "correlation_dimension", "boundary_dimension")
 INTERVAL = ("ci_low", "ci_high")
-WIDE_INTERVAL = 0.5  # width of an interval beyond which a point is drawn open
 
 
 @figure
@@ -288,7 +285,7 @@ def _draw_dimension(
     panel.key("contact domain", marker="o")
     if set(INTERVAL) <= path.variables.keys():
         low, high = map(panel.values, INTERVAL)
-        reliable = high - low <= WIDE_INTERVAL
+        reliable = high - low <= 0.5  # a quarter of the range of dimensions in a plane
         panel.area_key("interval", facecolor=_style.grey(), alpha=0.25)
         if len(y) == 1:
             panel.band(family.curve("interval"), x[0], low[0], high[0], family.styles[0]["color"])

@@ -134,9 +134,6 @@ def _read(result: Any, units: Units | None) -> xr.Dataset:
     return data.transpose("nominal_pressure", ..., missing_dims="ignore")
 
 
-LOCKED = 90.0  # degree; the joint cannot slide at a larger friction angle
-
-
 @figure
 def friction(
     result: Any,
@@ -191,9 +188,9 @@ def friction(
     remarks = []
     if by_force and "direction" in data.coords:
         remarks.append(f"block slides {_paths.direction_name(words(data['direction'])[0])}")
-    if shown[0].get_ylim()[1] > LOCKED:
-        shown[0].set_ylim(top=LOCKED)
-        remarks.append(f"locked above {LOCKED:g}°")
+    if shown[0].get_ylim()[1] > 90:  # degree; the joint cannot slide at a larger friction angle
+        shown[0].set_ylim(top=90)
+        remarks.append("locked above 90°")
     shown[0].set_title(", ".join(remarks))
     if len(names) > 1:
         shown[1].set_title(_slope_lengths(data))

@@ -23,10 +23,10 @@ AxesArray: TypeAlias = np.ndarray[Any, np.dtype[Any]]  # of Axes
 Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | matplotlib.figure.SubFigure"
 
 STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` writes
-FONT_SIZE = 9.0  # points; the sizes of figures below are for text of this size
-WIDTH = 7.2  # inches, a figure with several panels: A4 less margins of 13 mm
-PANEL = (5.2, 3.5)  # inches, a figure with one panel and its legend
-MAP = (4.6, 3.8)  # inches, a figure with one map and its colour bar
+# inches, of figures with text of 9 points
+WIDTH = 7.2  # with several panels: A4 less margins of 13 mm
+PANEL = (5.2, 3.5)  # with one panel and its legend
+MAP = (4.6, 3.8)  # with one map and its colour bar
 COLUMNS = 3  # of panels, at most
 
 # Okabe and Ito (2008): distinguishable with every kind of colour vision
@@ -46,8 +46,6 @@ OPEN_COLOUR, CONTACT_COLOUR = "#F2F0E9", "#12355B"
 STATE_COLOURS = (OPEN_COLOUR, CONTACT_COLOUR, RED)  # open, contact, yielded
 SLIP_COLOURS = (OPEN_COLOUR, CONTACT_COLOUR, ORANGE)  # open, stick, slip
 HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
-# the lightest colours of the map cannot be read on white, the darkest not on black
-SEQUENCE_ENDS = {"light": (0.0, 0.86), "dark": (0.3, 1.0)}
 MAX_LEGEND_ENTRIES = 8  # more do not fit beside a panel of usual height
 MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
 MOST_DOTS = 40  # the same of dots, which are half as wide
@@ -57,9 +55,6 @@ LINES: tuple[Any, ...] = ("-", (0, (4, 2)), ":", "-.")
 # what stands beside the curves of a figure is narrower than they are: nulls, references, theories
 THIN = 0.9  # points, beside curves of 1.5 and a grid of .6
 DASHED, DOTTED, DASH_DOTTED = ({"ls": line, "lw": THIN} for line in LINES[1:])
-# largest / smallest value beyond which an axis is logarithmic: on a linear one of 3 inches 1/30 is 2.5 mm
-LOG_AXIS_RATIO = 30.0
-NARROW_DECADES = 120.0  # up to two decades, with margins, have room for 1, 2 and 5 of each on a panel
 
 _for_files: ContextVar[bool] = ContextVar("figures for files", default=False)
 
@@ -133,13 +128,13 @@ def panel_row(axes: Panels | None, count: int, size: tuple[float, float], **layo
 def new_figure(size: tuple[float, float]) -> Any:
     """Return a figure of pyplot, which a notebook or a window shows; for files one that pyplot does not know.
 
-    The size, in inches, grows with the size of the text.
+    The size, in inches, is for text of 9 points, and grows with it.
     """
     import matplotlib
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    scale = max(1.0, float(matplotlib.rcParams["font.size"]) / FONT_SIZE)
+    scale = max(1.0, float(matplotlib.rcParams["font.size"]) / 9.0)
     layout = ConstrainedLayoutEngine(w_pad=0.07, h_pad=0.07)
     options: dict[str, Any] = {"figsize": (scale * size[0], scale * size[1]), "layout": layout}
     if _for_files.get():
@@ -218,7 +213,8 @@ def sequence_colours(count: int) -> list[Any]:
 
     colours = matplotlib.colormaps[SEQUENCE_MAP]
     is_light = sum(matplotlib.colors.to_rgb(matplotlib.rcParams["axes.facecolor"])) > 1.5
-    ends = SEQUENCE_ENDS["light" if is_light else "dark"]
+    # the lightest colours of the map cannot be read on white, the darkest not on black
+    ends = (0.0, 0.86) if is_light else (0.3, 1.0)
     return [colours(position) for position in np.linspace(*ends, max(count, 2))[:count]]
 
 
@@ -263,11 +259,11 @@ def letter(number: int) -> str:
     return chr(ord("A") + number) if number < 26 else str(number + 1)
 
 
-def needs_log_axis(values: Any) -> bool:
-    """Return True for positive values whose ratio exceeds `LOG_AXIS_RATIO`."""
+def needs_log_axis(values: Any, ratio: float = 30.0) -> bool:
+    """Return True for positive values of a larger ratio: on a linear axis of 3 inches 1/30 is 2.5 mm."""
     shown = np.asarray(values, dtype=float)
     shown = shown[np.isfinite(shown)]
-    return bool(shown.size and shown.min() > 0 and shown.max() > LOG_AXIS_RATIO * shown.min())
+    return bool(shown.size and shown.min() > 0 and shown.max() > ratio * shown.min())
 
 
 def plain_ticks(ax: Axes) -> None:
@@ -280,7 +276,7 @@ def plain_ticks(ax: Axes) -> None:
         low, high = sorted(ax.get_xlim() if axis is ax.xaxis else ax.get_ylim())  # of all curves so far
         if low < 1e-3 or high > 1e6:
             continue  # powers of ten are easier to read there
-        narrow = high / low < NARROW_DECADES
+        narrow = high / low < 120  # two decades, with margins, have room for 1, 2 and 5 of each
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,), numticks=12))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())

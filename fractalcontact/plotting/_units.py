@@ -53,7 +53,6 @@ OWN_NAME = frozenset(
         "pair_correlation_length",
     }
 )  # fmt: skip
-LONGEST_LABEL = 44  # characters of a line: of 9 points 2.9 inches, the height of a panel in a row
 PLAIN = Scale(1.0, "")  # of a number without a unit
 PER_CENT = Scale(0.01, "%")  # of a share
 PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
@@ -155,7 +154,8 @@ class Quantity:
 
     def label(self, axis: Any) -> None:
         """Label an axis; its unit can be read with `axis.get_units()`."""
-        axis.set_label_text(textwrap.fill(self.scale.label(self.name), LONGEST_LABEL))
+        # 44 characters of 9 points are 2.9 inches, the height of a panel in a row
+        axis.set_label_text(textwrap.fill(self.scale.label(self.name), 44))
         name = axis.axis_name
         shared = axis.axes.get_shared_x_axes() if name == "x" else axis.axes.get_shared_y_axes()
         for ax in shared.get_siblings(axis.axes):
