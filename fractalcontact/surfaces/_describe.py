@@ -19,7 +19,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, labelled_rows
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
-SLAB = 1 << 22  # points of a dask array at a time: its differences take ten times their 34 MB
+
 HEIGHT_STATISTICS = (
     "mean_height",
     "rms_height",
@@ -160,7 +160,11 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     return result | _gradients(neighbours, slopes, result["rms_height"], scale, unit, by_modes)
 
 
-def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> dict[str, float]:
+def _statistics_in_blocks(
+    surface: xr.DataArray,
+    spacing: Sequence[float],
+    slab: int = 1 << 22,  # points at a time: their differences take ten times their 34 MB
+) -> dict[str, float]:
     """Return the statistics of a plane or a profile of dask, from one row of blocks at a time."""
     axes, ny, nx = surface.ndim, (1, *surface.shape)[-2], surface.shape[-1]
     low, high, origin, total, size, infinite = math.inf, -math.inf, math.nan, 0.0, 0, 0
@@ -183,7 +187,7 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
     for block, start in _row_blocks(surface):
         block -= low
         block /= scale
-        for first in range(0, len(block), rows := max(3, SLAB // nx)):
+        for first in range(0, len(block), rows := max(3, slab // nx)):
             values = block[first : first + rows]
             is_known = ~np.isnan(values)
             powers += _powers(values[is_known], mean)

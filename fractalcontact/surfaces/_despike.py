@@ -12,9 +12,6 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._height_planes import with_heights
 
-# a quantile of the absolute residual, and the standard deviation of a Gaussian over it; the median called a
-# third of a coin and of heights of a few steps spikes
-SHARE, GAUSSIAN = 0.9, 0.6080
 ROUSSEEUW = "Rousseeuw and Croux, Journal of the American Statistical Association 88 (1993) 1273-1283"
 
 
@@ -110,7 +107,8 @@ def _spikes(heights: Array, window: int, threshold: float) -> tuple[Array, float
     heights = detrended(heights, 1)[0]
     flagged = np.zeros(heights.shape, dtype=bool)
     residual = np.abs(heights - _medians(heights, window))
-    deviation = GAUSSIAN * float(np.nanquantile(residual, SHARE))
+    # of a Gaussian, from a quantile; the median called a third of a coin and of heights of a few steps spikes
+    deviation = 0.6080 * float(np.nanquantile(residual, 0.9))
     while deviation > 0 and (new := (residual > threshold * deviation) & ~flagged).any():
         flagged |= new
         residual = np.abs(heights - _medians(np.where(flagged, np.nan, heights), window))

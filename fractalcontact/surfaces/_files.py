@@ -22,7 +22,7 @@ from fractalcontact.base.numbers import Array
 
 WHERE = "fractalcontact.surfaces.read"
 RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20
-_BLOCK = 1 << 22  # bytes
+
 COMMENTS = ("//", "%")
 DECIMAL = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
 HEADED = re.compile(r"(?P<name>[^\s\[(][^\[(\s]*(?: [^\[(\s]+)*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?(?=\s|$)")
@@ -43,7 +43,7 @@ def open_bytes(path: Path) -> IO[bytes]:
     limit = unpacked_limit(path.stat().st_size, RATIO)
     content = io.BytesIO()
     with corrupt_named(path.name), gzip.open(path) as file:
-        while content.tell() <= limit and (block := file.read(_BLOCK)):
+        while content.tell() <= limit and (block := file.read(1 << 22)):
             content.write(block)
     require_unpacked(WHERE, path.name, content.tell(), limit)
     content.seek(0)

@@ -15,11 +15,8 @@ from fractalcontact.base.references import provenance_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 
-COLLINEAR = 1e-7  # of the length of a cloud: points that are less wide lie on a line
-THICKEST = 0.7  # of the width of a cloud: thicker ones have no plane of their own
 PLANES = ("fit", "xy")
 KEEP_FRAME = ("surfaces.fill", "surfaces.despike")  # functions whose result is in the plane of their surface
-LARGEST = 1e100  # m: squares of it can be represented
 
 
 def check_points(problems: Problems) -> bool:
@@ -32,8 +29,8 @@ def check_points(problems: Problems) -> bool:
     least = values.shape[1] + 1
     if not problems.require(len(finite) >= least, "points", f"at least {least} points", len(finite) or NONE):
         return False
-    size = float(np.abs(finite).max())
-    return problems.require(size <= LARGEST, "points", f"coordinates of at most {LARGEST:g}", size)
+    size = float(np.abs(finite).max())  # m: its square can be represented
+    return problems.require(size <= 1e100, "points", "coordinates of at most 1e+100", size)
 
 
 def point_array(points: Any) -> Array | None:
@@ -168,11 +165,15 @@ def _plane_of(points: Array) -> tuple[Array, Array, float]:
     return centre, _rotation_to(normal, axis), math.sqrt(float(np.mean(distances * distances))) * scale
 
 
-def _require_plane(sizes: Array) -> None:
+def _require_plane(
+    sizes: Array,
+    collinear: float = 1e-7,  # width over length of points on a line: rounding leaves 1.3e-8
+    thickest: float = 0.7,  # thickness over width; of 300 balls of 100 points 1 % have less than .77
+) -> None:
     problem = ""
-    if sizes[-1] == 0.0 or (sizes.size == 3 and sizes[1] <= COLLINEAR * sizes[-1]):
+    if sizes[-1] == 0.0 or (sizes.size == 3 and sizes[1] <= collinear * sizes[-1]):
         problem = "points that span a plane, got points on one line or at one place"
-    elif sizes[0] > THICKEST * sizes[1]:
+    elif sizes[0] > thickest * sizes[1]:
         problem = (
             f"points about a plane, got a cloud {sizes[0] / sizes[1]:.2g} times as thick as it is wide: "
             "select one face of it first"

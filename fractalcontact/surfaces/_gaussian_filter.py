@@ -14,10 +14,6 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
 
-LEAST_SPACINGS = 4  # of the cutoff: a shorter kernel has too few points for its transmission
-_SPREAD = math.sqrt(math.log(2.0) / 2.0) / math.pi  # standard deviation over the cutoff
-_REACH = 1.0  # of the cutoff: the kernel has fallen to 1e-6 there
-
 
 def _check(problems: Problems) -> None:
     given = problems.given
@@ -25,7 +21,8 @@ def _check(problems: Problems) -> None:
     problems.choice("keep", among=("long", "short"))
     if problems.number("cutoff", above=0) and is_valid:
         grid = read_grid(given.surface, core_dims(given.surface))
-        least, most = LEAST_SPACINGS * max(grid.spacing), max(grid.extent)
+        # a shorter kernel has too few points for its transmission: see the achieved error
+        least, most = 4 * max(grid.spacing), max(grid.extent)
         expected = f"{least:.3g} m (four spacings) to {most:.3g} m (the extent)"
         is_inside = least * (1 - 1e-9) <= float(given.cutoff) <= most * (1 + 1e-9)
         problems.require(is_inside, "cutoff", expected)
@@ -93,11 +90,12 @@ def weighted_mean(heights: Array, cutoff: float, spacing: Sequence[float], perio
     observed = np.isfinite(heights)
     reference = float(heights[observed].mean()) if observed.any() else 0.0
     total, weight = np.where(observed, heights - reference, 0.0), observed.astype(float)
+    deviation = math.sqrt(math.log(2.0) / 2.0) / math.pi * cutoff  # a cutoff/sqrt(2 pi), a^2 = ln 2/pi
     for axis, (step, wraps) in enumerate(zip(spacing, periodic, strict=True)):
-        reach = min(int(_REACH * cutoff / step), heights.shape[axis])
-        kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / (_SPREAD * cutoff)) ** 2)
-        kernel /= kernel.sum()
+        reach = min(int(cutoff / step), heights.shape[axis])  # the weights have fallen to 1e-6 there
+        weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / deviation) ** 2)
+        weights /= weights.sum()
         mode = "wrap" if wraps else "constant"
-        total, weight = (convolve1d(values, kernel, axis=axis, mode=mode) for values in (total, weight))
+        total, weight = (convolve1d(values, weights, axis=axis, mode=mode) for values in (total, weight))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(observed, reference + total / weight, np.nan)

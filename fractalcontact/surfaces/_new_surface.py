@@ -16,7 +16,6 @@ from fractalcontact.base.numbers import Array, float_array, is_real, number_of_a
 from fractalcontact.base.validation import GIVEN, Problems
 
 SHORTEST, LONGEST = 10.0**-DECADES, 10.0**DECADES  # m
-COPIES = 2  # of the heights: the result and one work array
 
 
 def check_shape(problems: Problems, shape: Any, *, profile: bool = True) -> bool:
@@ -59,7 +58,7 @@ def check_plane(problems: Problems, *, profile: bool = True) -> bool:
 def check_memory(where: str, sizes: Sequence[int]) -> None:
     """Raise `TooLittleMemory` unless heights of these sizes, and a work array like them, may be taken."""
     shape = " x ".join(f"{size:g}" for size in sizes if size != 1)
-    needed = COPIES * 8.0 * math.prod(float(size) for size in sizes)
+    needed = 2 * 8.0 * math.prod(float(size) for size in sizes)  # the heights and one work array
     require_memory(where, needed, f"a shape of {shape} points")
 
 

@@ -38,9 +38,7 @@ NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
 TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *_read_points.ALWAYS_POINTS)
 RASTERS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"ncols", b"NCOLS", b"DSAA", b"DSBB", b"DSRB")
 IMAGES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM")
-WIDE_CLOUD = 20.0  # m: points of a file without a unit that are wider may be in millimetres
-RELIEF = (1e-6, 10.0)  # plausible range of heights over lateral extent
-TALL, MOST_COLUMNS = 20, 12  # rows over columns, and columns, of a table that may be a list of points
+
 GRIDDING = (
     "plane",
     "rotation_matrix",
@@ -53,7 +51,6 @@ GRIDDING = (
     "largest_gap",
     "overhang_share",
 )  # entries of the provenance of `from_points`
-WIDEST = 1.0  # m: wider than the field of any microscope
 
 
 def _check(problems: Problems) -> None:
@@ -225,7 +222,7 @@ def _text_content(request: Request) -> FileContent:
             message = f"path: {path.name!r} is not a table of numbers ({expected}, got {first!r})"
             problems.messages.append(message)
         expected = "a grid of heights, or `columns`, the names or numbers of those of x, y, z"
-        is_tall = number < MOST_COLUMNS and rows > TALL * number
+        is_tall = number < 12 and rows > 20 * number  # as a list of points is, not a map
         problems.require(not is_tall, "path", expected, f"{rows} rows of {number} columns")
     if request.spacing is None:
         return _instrument_or_table(request, is_table=True)
@@ -262,7 +259,7 @@ def _gridded_points(points: Points, request: Request) -> FileContent:
         )
     gridding = {key: value for key, value in provenance_of(surface).items() if key in GRIDDING}
     widest = max(float(np.ptp(surface[dim].values)) for dim in surface.dims)
-    if units is None and points.unit is None and widest > WIDE_CLOUD:
+    if units is None and points.unit is None and widest > 20.0:  # or it is a scan of a dam
         message = (
             f"{request.path.name}: the points extend over {widest:.3g} m and the file states no unit: if "
             "they are in millimetres, give units='mm'; else units='m'"
@@ -379,14 +376,13 @@ def _warn_of_scale(content: FileContent, name: str) -> None:
     heights = content.surface.values
     widest = max(read_grid(content.surface, core_dims(content.surface)).extent)
     faults = []
-    if content.is_microscope and widest > WIDEST:
+    if content.is_microscope and widest > 1.0:
         faults.append(f"the field is {widest:g} m wide, more than any microscope has")
     observed = heights[np.isfinite(heights)]
     relief = float(observed.max() - observed.min()) / widest if observed.size else 0.0
-    if relief > 0 and not RELIEF[0] <= relief <= RELIEF[1]:
-        expected = f"{RELIEF[0]:g} ... {RELIEF[1]:g}"
+    if relief > 0 and not 1e-6 <= relief <= 10.0:
         faults.append(
-            f"heights span {relief:.1g} of the extent of {widest:.3g} m, a ratio outside {expected}"
+            f"heights span {relief:.1g} of the extent of {widest:.3g} m, a ratio outside 1e-06 ... 10"
         )
     if faults:
         message = f"{name}: {'; '.join(faults)}; if the unit in the file is wrong, give `units` or `spacing`"

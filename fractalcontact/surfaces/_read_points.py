@@ -32,13 +32,11 @@ MESHES = (".ply", ".stl", ".obj", ".off")
 CLOUDS = (".las", ".laz")
 LISTS = (".xyz", ".pts", ".csv", ".txt", ".tsv", ".dat", ".asc")
 ALWAYS_POINTS = (".xyz", ".pts")  # suffixes of lists whose further columns are colours and the like
-LEAST_POINTS = 4  # rows of a table of two or three columns that is a list of points
+LEAST_POINTS = 4  # rows of a table of two or three columns that is a list of points, and of a plane
 X = ("x", "points:0", "easting", "east", "e")
 Y = ("y", "points:1", "northing", "north", "n")
 Z = ("z", "points:2", "height", "elevation", "altitude", "h")
 DEGREES = ("lon", "long", "longitude", "lat", "latitude")
-LEAST_RECORD = 54  # bytes of a record of a LAS file without content
-GEOGRAPHIC_MODEL = (1024, 2)  # key and value of a GeoTIFF directory: latitude and longitude
 
 
 @dataclass(frozen=True)
@@ -287,7 +285,7 @@ def _check_las_size(file: IO[bytes], path: Path) -> None:
     if _unpacked("<BB", file, 24) >= (1, 4):
         counts["extended records"] = _unpacked("<I", file, 243)
     for what, (count,) in counts.items():
-        if count * LEAST_RECORD > size:
+        if count * 54 > size:  # bytes of a record without content
             raise ValueError(f"it states {count} {what} in {size} bytes")
     file.seek(0)
     header = laspy.LasHeader.read_from(file)
@@ -317,6 +315,6 @@ def _reference_system(records: Any) -> str:
         if units := re.findall(r'UNIT\s*\[\s*"([^"]*)"', text):
             return "foot" if any("FOOT" in unit or "FEET" in unit for unit in units) else "metre"
         keys = [(key.id, key.value_offset) for key in getattr(record, "geo_keys", ())]
-        if GEOGRAPHIC_MODEL in keys:
+        if (1024, 2) in keys:  # of a GeoTIFF directory: the model is latitude and longitude
             return "degree"
     return ""

@@ -10,10 +10,6 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import Moments
 from fractalcontact.base.validation import Problems
 
-# the integral of x^power J0(x): power series below, quadrature between, asymptotic series above. It is exact
-# to 4e-12; with the first at 10 to 6e-11, with the second at 20 to 7e-5 (powers -1.2 to -3, from .01 to 35)
-_SERIES, _ASYMPTOTIC, _TERMS = 6.0, 40.0, 40
-
 
 @dataclass(frozen=True)
 class SelfAffine:
@@ -154,9 +150,12 @@ class SelfAffine:
         return tuple(2.0 * np.pi / length for length in (self.long_cutoff, self.rolloff, self.short_cutoff))  # type: ignore[return-value]
 
 
-def _bessel_integral(power: float, start: Array) -> Array:
-    """Return the integral of x^power J0(x) from `start` (above 0) to infinity, power < 1/2."""
-    near, far = _SERIES, _ASYMPTOTIC
+def _bessel_integral(power: float, start: Array, near: float = 6.0, far: float = 40.0) -> Array:
+    """Return the integral of x^power J0(x) from `start` (above 0) to infinity, power < 1/2.
+
+    Power series up to `near`, quadrature to `far`, asymptotic series beyond. It is exact to 4e-12; with 10
+    and 40 to 6e-11, with 6 and 20 to 7e-5 (powers -1.2 to -3, from .01 to 35).
+    """
     nodes, weights = np.polynomial.legendre.leggauss(60)
 
     def between(first: Array) -> Array:
@@ -172,7 +171,7 @@ def _bessel_integral(power: float, start: Array) -> Array:
     total = beyond + middle
     first = np.minimum(start, near)
     factor = 1.0
-    for k in range(_TERMS):  # power series of J0
+    for k in range(40):  # power series of J0
         exponent = power + 2 * k + 1.0
         if abs(exponent) < 1e-12:
             term = np.log(near / first)

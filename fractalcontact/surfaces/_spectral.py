@@ -23,7 +23,10 @@ JACOBS = (
     "Jacobs, Junge and Pastewka, Quantitative characterization of surface topography using spectral "
     "analysis, Surface Topography: Metrology and Properties 5 (2017) 013001"
 )
-BLOCK = 1 << 15  # modes processed at a time, so that they stay in the processor cache
+
+# modes drawn at a time, which bounds the memory; their order depends on it. 2^13 to 2^20 take the same time
+# within a tenth for 1024 x 1024 points
+BLOCK = 1 << 15
 EDGE = 1e-9  # relative distance from a cut-off within which a mode counts as inside
 
 

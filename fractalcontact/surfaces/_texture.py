@@ -18,10 +18,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_planes import check_planes, height_planes, labelled_rows
 
 DECAY = 0.2  # of the autocorrelation at the lengths (ISO 25178-2, default of Sal and Str)
-_CORE_WIDTH = 0.4  # of the material ratio under the secant of the core (ISO 25178-2)
-_RAYS = 360  # directions over the half circle; 1440 change lengths by 2e-5 and the aspect ratio by 6e-5
-# values of the autocorrelation in a spacing along a ray; 16 change lengths by .2 %, 1 by 1.5 %
-_PER_POINT = 4
+
 _LEAST = 8  # observed points: fewer have no curve of heights of which 40 % are a line
 _CORRELATION = ("autocorrelation_length", "texture_aspect_ratio")
 _CORE = (
@@ -116,7 +113,12 @@ def _reason(name: str, axes: int) -> str:
     return f"fewer than {_LEAST} points were observed"
 
 
-def _correlation(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> list[float]:
+def _correlation(
+    heights: Array,
+    spacing: Sequence[float],
+    periodic: Sequence[bool],
+    rays: int = 360,  # over the half circle; 1440 change lengths by 2e-5 and the aspect ratio by 6e-5
+) -> list[float]:
     """Return the shortest distance at which the autocorrelation has fallen, and its ratio to the longest."""
     plane = np.atleast_2d(heights)
     observed = np.isfinite(plane)
@@ -126,7 +128,7 @@ def _correlation(heights: Array, spacing: Sequence[float], periodic: Sequence[bo
     values = np.where(observed, values - values[observed].mean(), 0.0)
     steps = (spacing[-1] if heights.ndim == 1 else spacing[0], spacing[-1])
     acf, reach = _autocorrelation(values, observed, (False, *periodic)[-2:])
-    angles = np.zeros(1) if heights.ndim == 1 else np.arange(_RAYS) * np.pi / _RAYS
+    angles = np.zeros(1) if heights.ndim == 1 else np.arange(rays) * np.pi / rays
     lengths = np.array([_decay(acf, reach, steps, float(angle)) for angle in angles])
     if np.isnan(lengths).all():
         return [math.nan, math.nan]
@@ -149,14 +151,20 @@ def _autocorrelation(
     return mean / mean[reach[0], reach[1]], (reach[0], reach[1])
 
 
-def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle: float) -> float:
+def _decay(
+    acf: Array,
+    reach: tuple[int, int],
+    steps: tuple[float, float],
+    angle: float,
+    per_point: int = 4,  # values in a spacing along the ray; 16 change lengths by .2 %, 1 by 1.5 %
+) -> float:
     """Return the distance along a ray at which the autocorrelation falls to `DECAY`; NaN if it does not."""
     from scipy.ndimage import map_coordinates
 
     unit = np.sin(angle) / steps[0], np.cos(angle) / steps[1]  # points per metre
     limits = [lag / abs(u) for lag, u in zip(reach, unit, strict=True) if abs(u) > 1e-9 * max(map(abs, unit))]
     longest = min(limits)
-    number = 2 + int(_PER_POINT * longest * max(map(abs, unit)))
+    number = 2 + int(per_point * longest * max(map(abs, unit)))
     distance = np.linspace(0.0, longest, number)
     places = [lag + u * distance for lag, u in zip(reach, unit, strict=True)]
     coarse = map_coordinates(acf, places, order=1)
@@ -164,7 +172,7 @@ def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle
     if not below.size:
         return math.nan
     # a cubic through the points near the crossing
-    near = slice(max(int(below[0]) - 2 * _PER_POINT, 0), int(below[0]) + 2 * _PER_POINT)
+    near = slice(max(int(below[0]) - 2 * per_point, 0), int(below[0]) + 2 * per_point)
     low = [max(int(place[near].min()) - 4, 0) for place in places]
     high = [int(place[near].max()) + 6 for place in places]
     part = acf[low[0] : high[0], low[1] : high[1]]
@@ -188,7 +196,7 @@ def _core(heights: Array) -> list[float]:
     values, _, scale = shifted(observed)
     curve = np.sort(values)[::-1]
     ratio = (np.arange(curve.size) + 0.5) / curve.size
-    width = max(2, round(_CORE_WIDTH * curve.size))
+    width = max(2, round(0.4 * curve.size))  # under the secant of the core (ISO 25178-2)
     drop = curve[: curve.size - width + 1] - curve[width - 1 :]
     flattest = np.flatnonzero(drop <= drop.min() + 1e-12 * (curve[0] - curve[-1]))
     start = int(flattest[0])
