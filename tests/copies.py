@@ -39,7 +39,7 @@ while True:
     orders.sendall(copy.to_bytes({SIZE}))
     orders.sendall(os.waitstatus_to_exitcode(os.waitpid(copy, 0)[1]).to_bytes({SIZE}, signed=True))
 orders.close()
-sys.argv, folder, environment, largest_file = json.loads(task)
+sys.argv, folder, environment, largest_file, program = json.loads(task)
 if largest_file:
     import resource
     resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
@@ -49,7 +49,10 @@ os.chdir(folder)
 for number, place in enumerate([os.open(os.devnull, os.O_RDONLY), *places]):
     os.dup2(place, number)
     os.close(place)
-runpy.run_module("fractalcontact", run_name="__main__", alter_sys=True)
+if program:
+    exec(program)
+else:
+    runpy.run_module("fractalcontact", run_name="__main__", alter_sys=True)
 """
 
 
@@ -62,6 +65,8 @@ class Copy:
         Of the command.
     largest_file : int
         The bytes that a file may have, on a disk that is full then.
+    program : str
+        Python that is run in place of the command.
 
     Attributes
     ----------
@@ -69,10 +74,11 @@ class Copy:
         Number of the process; how it ended, None before.
     """
 
-    def __init__(self, *words, largest_file=None):
+    def __init__(self, *words, largest_file=None, program=None):
         self._out = tempfile.TemporaryFile()  # noqa: SIM115
         self._error, error = os.pipe()
-        task = ["fractalcontact", *map(str, words)], str(Path.cwd()), dict(os.environ), largest_file
+        arguments = ["fractalcontact", *map(str, words)]
+        task = arguments, str(Path.cwd()), dict(os.environ), largest_file, program
         socket.send_fds(_orders(), [json.dumps(task).encode()], [self._out.fileno(), error])
         os.close(error)
         self.pid, self.returncode = self._number(), None
@@ -102,9 +108,9 @@ class Copy:
         return int.from_bytes(_orders().recv(SIZE, socket.MSG_WAITALL), signed=True)
 
 
-def copied_command(*words, largest_file=None):
+def copied_command(*words, **options):
     """Run the command in a copy; return what `subprocess.run` returns."""
-    copy = Copy(*words, largest_file=largest_file)
+    copy = Copy(*words, **options)
     out, errors = copy.communicate()
     return subprocess.CompletedProcess(words, copy.returncode, out, errors)
 

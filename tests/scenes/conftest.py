@@ -1,7 +1,5 @@
 """Fixtures of the tests of studies."""
 
-import math
-
 import pytest
 from matplotlib.figure import Figure
 
@@ -25,5 +23,5 @@ def empty_figures():
 def one_process():
     """Run the parts of studies in this process, where tests record their calls, however slow it is."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", math.inf)
+        patch.setenv("FRACTALCONTACT_THREADS", "1")
         yield

@@ -1,6 +1,5 @@
 """Workers that are remote, lost, stopped or not available."""
 
-import functools
 import json
 import multiprocessing
 import os
@@ -11,11 +10,11 @@ import sys
 import threading
 import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from pathlib import Path
 
 import netCDF4
 import numpy as np
 import pytest
-import xarray as xr
 from copies import Copy, copied_command
 from study import SOUND, watch_calls
 
@@ -23,10 +22,7 @@ import fractalcontact as fc
 from fractalcontact import cli
 from fractalcontact.base import threads
 from fractalcontact.base.errors import FractalContactError, InvalidInput
-from fractalcontact.base.process import calls_in_two_processes, can_fork
-from fractalcontact.base.signals import Stop, Stopped
-from fractalcontact.scenes._checkpoint import PartStore
-from fractalcontact.scenes._executor import run_tasks
+from fractalcontact.base.signals import Stopped
 
 SWEEP = (
     SOUND.replace("rng = 5", "rng = 5\nmembers = 5").replace("[48, 48]", "[32, 32]").replace("2.4e-3", "1e-3")
@@ -216,66 +212,94 @@ def test_killed_worker_of_dask_changes_no_byte(uninterrupted, tmp_path, once_the
 FIVE_SHEARS = SOUND.replace("[1e-4, 4e-4]", "[1e-4, 2e-4, 3e-4, 4e-4, 5e-4]")
 
 
-@pytest.mark.parametrize("text", [FIVE_SHEARS, SWEEP])
+# a study whose first call lasts long enough that a copy of the process is worth it, with two threads; the
+# processes that run tests have other threads, with which they are not copied
+SLOW_START = """
+import os, sys, time, types
+sys.path.insert(0, sys.argv[3])
+import fractalcontact as fc
+from fractalcontact.base import threads
+from study import watch_calls
+
+copies, counts = [], []
+
+def note(name):
+    counts.append(threads.thread_count())
+    time.sleep(0.6 if len(counts) == 1 else 0)
+
+os.register_at_fork(before=lambda: copies.append(1))
+watch_calls(types.SimpleNamespace(setattr=setattr), note)
+fc.scenes.run(sys.argv[1], out=sys.argv[2], progress=False)
+print(len(copies), *counts)
+"""
+
+
+def run_with_a_slow_start(folder, text, program=SLOW_START):
+    """Run a study in a process of its own; return its result, the copies made, the threads of its calls."""
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    done = copied_command(folder / "study.toml", folder / "out", Path(__file__).parents[1], program=program)
+    copies, *counts = map(int, done.stdout.split())
+    return done, copies, counts
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no process is copied")
+@pytest.mark.parametrize("text", ["shears", "members", "stages"])
 def test_copy_of_the_process_computes_the_same_numbers(tmp_path, monkeypatch, text):
-    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
-    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
-    serial = fc.scenes.run(tmp_path / "study.toml", progress=False)
-    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
-    shared = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
-    for name in ("joints/closure", "joints/rigid_dilatancy"):
-        for variable in set(serial[name].variables) - {"run_time"}:
-            xr.testing.assert_identical(serial[name][variable].variable, shared[name][variable].variable)
-
-
-def test_stages_side_by_side_give_the_same_numbers(tmp_path, monkeypatch):
-    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
     wanted = 'surfaces = ["height", "describe"]\ndimensions = ["default", "spectrum"]\njoints = ['
-    (tmp_path / "study.toml").write_text(SOUND.replace("joints = [", wanted), encoding="utf-8")
+    texts = {"shears": FIVE_SHEARS, "members": SWEEP, "stages": SOUND.replace("joints = [", wanted)}
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
+    done, copies, counts = run_with_a_slow_start(tmp_path, texts[text])
+    assert (done.returncode, done.stderr) == (0, "")
+    assert copies >= 1
+    assert counts[0] == 2
+    assert set(counts[1:]) == {1}
+    monkeypatch.setenv("FRACTALCONTACT_THREADS", "1")
     serial = fc.scenes.run(tmp_path / "study.toml", progress=False)
-    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
-    # other tests may have left threads, with which no copy of the process is made
-    counts, can_copy = [], can_fork()
-    monkeypatch.setattr("fractalcontact.scenes._executor.can_fork", lambda: True)
-
-    def counted(function, count):
-        counts.append(count)
-        if can_copy:
-            return calls_in_two_processes(function, count)
-        return ((number, function(number)) for number in range(count))
-
-    monkeypatch.setattr("fractalcontact.scenes._executor.calls_in_two_processes", counted)
-    shared = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
-    assert max(counts) > 4  # the two closures, and more
-    stages = [json.loads(tree.attrs["provenance"])["stages"] for tree in (serial, shared)]
-    assert [*stages[0]] == [*stages[1]]
-    assert [node.path for node in serial.subtree] == [node.path for node in shared.subtree]
-    for node in serial.subtree:
-        for variable in set(node.variables) - {"run_time"}:
-            found = shared[node.path][variable].variable
-            xr.testing.assert_identical(node[variable].variable, found)
+    with fc.open(tmp_path / "out" / "result.nc") as shared:
+        stages = [[*json.loads(tree.attrs["provenance"])["stages"]] for tree in (serial, shared)]
+        assert stages[0] == stages[1]
+        assert [node.path for node in serial.subtree] == [node.path for node in shared.subtree]
+        for node in serial.subtree:
+            for name in set(node.variables) - {"run_time"}:
+                np.testing.assert_array_equal(node[name].values, shared[node.path][name].values, name)
 
 
-def test_last_task_keeps_all_threads(monkeypatch):
+@pytest.mark.skipif(sys.platform != "linux", reason="no process is copied")
+def test_last_task_keeps_all_threads(tmp_path, monkeypatch):
     """A copy of the process helps from two tasks on: one alone is not held to half of the threads."""
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
-    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
-    tasks = dict.fromkeys("ab", lambda store, stop: threads.thread_count())
-    assert dict(run_tasks(tasks, PartStore(None), Stop(), points=0)) == {"a": 2, "b": 2}
+    done, copies, counts = run_with_a_slow_start(tmp_path, SOUND.replace(', "rigid_dilatancy"', ""))
+    assert (done.returncode, copies) == (0, 0)
+    assert set(counts) == {2}
 
 
+FAILING = SLOW_START.replace(
+    "watch_calls(",
+    """
+import functools
+from fractalcontact.base.errors import InvalidInput
+closure = fc.joints.closure
+def fail_late(crack, *, shear, **options):
+    if shear[0] > 3.5e-4:
+        raise InvalidInput("fractalcontact.joints.closure", ["shear: too far"])
+    return closure(crack, shear=shear, **options)
+fc.joints.closure = functools.update_wrapper(fail_late, closure)
+watch_calls(""",
+).replace(
+    "fc.scenes.run(sys.argv[1], out=sys.argv[2], progress=False)",
+    """
+try:
+    fc.scenes.run(sys.argv[1], out=sys.argv[2], progress=False)
+except InvalidInput as error:
+    sys.stderr.write(str(error))
+""",
+)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="no process is copied")
 def test_error_of_a_part_is_raised_with_a_copy(tmp_path, monkeypatch):
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
-    monkeypatch.setattr("fractalcontact.scenes._executor.WORTH_A_COPY", 0.0)
-    (tmp_path / "study.toml").write_text(FIVE_SHEARS, encoding="utf-8")
-    closure = fc.joints.closure
-
-    def fail_late(crack, *, shear, **options):
-        if shear[0] > 3.5e-4:
-            raise InvalidInput("fractalcontact.joints.closure", ["shear: too far"])
-        return closure(crack, shear=shear, **options)
-
-    monkeypatch.setattr(fc.joints, "closure", functools.update_wrapper(fail_late, closure))
-    with pytest.raises(InvalidInput, match="too far"):
-        fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    done, copies, _ = run_with_a_slow_start(tmp_path, FIVE_SHEARS, FAILING)
+    assert copies == 1
+    assert "shear: too far" in done.stderr
     assert len(list((tmp_path / "out" / ".stages").glob("joints.closure.*"))) == 3
