@@ -40,6 +40,7 @@ class Quantity:
 
 
 STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
+DEFAULT_TOLERANCE = 1e-8  # of a contact; from 1e-5 on the area is that of the solution (page theory_contact)
 SMALL = 4096  # bytes of a variable other than a map, up to which compression saves no space
 
 

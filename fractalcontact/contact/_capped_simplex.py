@@ -15,18 +15,21 @@ import numpy as np
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact._scaled_problem import sum_by_rows
 
-MAX_NEWTON_STEPS = 200  # far more than the pieces that a bracketed Newton step passes; it ends at rounding
-MAX_FORCE_CORRECTIONS = 50  # each clips more nodes to p_max; without success the lowest nodes bear the force
 
-
-def project_onto_capped_simplex(q: Array, force: float, p_max: float) -> Array:
+def project_onto_capped_simplex(
+    q: Array,
+    force: float,
+    p_max: float,
+    *,
+    max_steps: int = 200,  # far more than the pieces that a bracketed Newton step passes; it ends at rounding
+) -> Array:
     """Shift values by one amount so that, clipped to 0 .. p_max, they add up to `force`.
 
     The sum is piecewise linear in the shift, so that Newton's method ends after a few steps.
     """
     low, high, shift = float(q.min()) - p_max, float(q.max()), 0.0
     p = np.clip(q, 0.0, p_max)
-    for _ in range(MAX_NEWTON_STEPS):
+    for _ in range(max_steps):
         excess = float(np.sum(p)) - force
         low, high = (shift, high) if excess > 0 else (low, shift)
         free = int(np.count_nonzero((p > 0) & (p < p_max)))
@@ -53,12 +56,20 @@ def uniform_on_lowest(level: Array, force: float, p_max: float) -> Array:
     return pressure
 
 
-def scale_to_force(p: Array, level: Array, p_max: Any, force: float, epsilon: float) -> None:
+def scale_to_force(
+    p: Array,
+    level: Array,
+    p_max: Any,
+    force: float,
+    epsilon: float,
+    *,
+    max_corrections: int = 50,  # each clips more nodes to p_max
+) -> None:
     """Scale the pressures below p_max, in place, until they add up to `force`.
 
-    Where none can be scaled, the force is put on the nodes of lowest level.
+    Where none can be scaled, or the corrections do not end, the force is put on the nodes of lowest level.
     """
-    for _ in range(MAX_FORCE_CORRECTIONS):
+    for _ in range(max_corrections):
         total = sum_by_rows(p)
         if abs(total - force) <= epsilon * force:
             return

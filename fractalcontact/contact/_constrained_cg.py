@@ -53,11 +53,11 @@ What was tried:
 - The preconditioner (`_preconditioner`) makes the inner problem converge by a factor of about five an
   iteration whatever the grid. |q| alone needs three to five times as many iterations, and more as n grows.
 - With an inner solver that good, letting nodes in and out in the same iteration cycles without end at
-  n >= 1024. New nodes are therefore admitted only when the error outside exceeds ADMIT_RATIO times the error
+  n >= 1024. New nodes are therefore admitted only when the error outside exceeds `admit_ratio` times that
   inside (proportioning, Dostal and Schoeberl 2005, Comput. Optim. Appl. 30:23), or when they are few; then
-  the set settles in a few changes. ADMIT_RATIO from 0.1 to 0.8 and FEW from 0.0003 to 0.01 give the same
+  the set settles in a few changes. `admit_ratio` from 0.1 to 0.8 and `few` from 0.0003 to 0.01 give the same
   number of transforms within a tenth.
-- Conjugacy is kept while the set changes by less than SLIGHT_CHANGE; at n = 2048 that saves a sixth of the
+- Conjugacy is kept while the set changes by less than `slight_change`; at n = 2048 that saves a sixth of the
   transforms. (Bugnicourt et al. 2018, Tribol. Lett. 66:29, never restart.)
 - Leaving slightly negative pressures unprojected, to save K p, saves a tenth of the transforms at best and
   cycles at worst: rejected.
@@ -74,7 +74,6 @@ What was tried:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 from typing import Any
@@ -92,29 +91,11 @@ from fractalcontact.contact._capped_simplex import (
 )
 from fractalcontact.contact._contact_system import ContactSystem
 from fractalcontact.contact._preconditioner import FreeSet
-from fractalcontact.contact._scaled_problem import Control, Solution, sum_by_rows
+from fractalcontact.contact._scaled_problem import Control, Solution, strips, sum_by_rows
 
-ADMIT_RATIO = 0.4  # error outside over error inside from which nodes are admitted
-FEW = 0.003  # share of the free set that is always admitted
-SLIGHT_CHANGE = 0.001  # share of the free set that may change without loss of the conjugacy
 # 206 solutions on rough surfaces took 20 at most at a tolerance of 1e-10, and 3828 runs of the tests,
 # which have spikes that yield, 240 at most
 MAX_ITERATIONS = 500
-# iterations without progress after which it gives up; with 40 two surfaces with spikes that yield stay open
-PATIENCE = 200
-# the same once the residual is that of rounding; 25 took a fifth more transforms on 150 surfaces with spikes
-PATIENCE_AT_ROUNDING = 5
-# iterations without progress from which a step must lower the objective by more than rounding; with 50 the
-# same 150 surfaces converge as well
-STALLED = 10
-# fall of the objective, over its size: less is no progress; 1e-4 and 1e-2 changed nothing
-SMALLEST_FALL = 1e-3
-MAX_HALVINGS = 20  # of a step, a factor 1e-6; none in 206 solutions on rough surfaces with and without p_max
-# elements at a time, which stay in the cache; threads that take fewer wait for each other's calls of NumPy
-STRIP = 1 << 17
-# share of the tolerance: what rounding may add to a displacement that follows steps; .001 and .1 took as many
-# transforms
-ROUNDING_OF_STEPS = 0.01
 RELEASED: Array = np.empty((0, 0))  # stands in for an array whose memory is free for the next one
 
 
@@ -196,8 +177,20 @@ class ConstrainedCG:
         self.last_objective = np.inf
         np.clip(start, 0, self.p_max, out=self.p, casting="same_kind")
 
-    def solve(self, tolerance: float, *, certify: bool = True) -> Solution:
-        """Iterate until the residual is at most `tolerance`; with `certify`, for an exact displacement."""
+    def solve(
+        self,
+        tolerance: float,
+        *,
+        certify: bool = True,
+        patience: int = 200,  # with 40 two surfaces with spikes that yield stay open
+        patience_at_rounding: int = 5,  # with 25 a fifth more transforms on 150 surfaces with spikes
+        least_fall: float = 1e-3,  # of the objective, over its size; 1e-4 and 1e-2 changed nothing
+    ) -> Solution:
+        """Iterate until the residual is at most `tolerance`; with `certify`, for an exact displacement.
+
+        Gives up after `patience` iterations without progress, and after `patience_at_rounding` once the
+        residual is that of rounding.
+        """
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
         while iteration <= MAX_ITERATIONS:
@@ -213,11 +206,11 @@ class ConstrainedCG:
                     break
                 self.update_displacement()
                 continue
-            progress.update(residual, evaluation.objective, SMALLEST_FALL * evaluation.objective_size)
+            progress.update(residual, evaluation.objective, least_fall * evaluation.objective_size)
             at_rounding = residual <= evaluation.residual_floor
             iteration += 1
-            patience = PATIENCE_AT_ROUNDING if at_rounding else PATIENCE
-            if progress.stalled > patience or not self.find_step(evaluation, inside, outside):  # (3) to (8)
+            limit = patience_at_rounding if at_rounding else patience
+            if progress.stalled > limit or not self.find_step(evaluation, inside, outside):  # (3) to (8)
                 reason = "rounding" if at_rounding else "stagnated"
                 break
             self.take_step()  # (9), (10)
@@ -262,13 +255,19 @@ class ConstrainedCG:
         self.u = self.operator.apply(self.p)
         self.updates = 0
 
-    def displacement_is_exact(self, evaluation: Evaluation, tolerance: float) -> bool:
-        """Return whether u = K p, but for what steps have added by rounding: far less than the tolerance."""
+    def displacement_is_exact(
+        self,
+        evaluation: Evaluation,
+        tolerance: float,
+        *,
+        share: float = 0.01,  # .001 and .1 took as many transforms
+    ) -> bool:
+        """Return whether u = K p, but for what steps have added by rounding: a share of the tolerance."""
         if self.updates == 0:
             return True
         largest = max(float(self.u.max()), -float(self.u.min()))
         rounding = 64 * self.epsilon * self.updates * largest
-        return rounding <= ROUNDING_OF_STEPS * tolerance * evaluation.scale
+        return rounding <= share * tolerance * evaluation.scale
 
     # objective and error
 
@@ -314,11 +313,23 @@ class ConstrainedCG:
 
     # search direction and step length
 
-    def find_step(self, evaluation: Evaluation, inside: GapSums, outside: GapSums) -> bool:
-        """Find direction (3 to 6) and step length (7, 8); False where there is none."""
+    def find_step(
+        self,
+        evaluation: Evaluation,
+        inside: GapSums,
+        outside: GapSums,
+        *,
+        admit_ratio: float = 0.4,
+        few: float = 0.003,
+    ) -> bool:
+        """Find direction (3 to 6) and step length (7, 8); False where there is none.
+
+        Nodes are admitted from `admit_ratio` on, of the error outside over that inside, or while they are
+        fewer than the share `few` of the free set.
+        """
         mean_part = inside.g**2 / inside.count if self.force_controlled and inside.count else 0.0
         spread = max(inside.g2 - mean_part, 0.0)
-        admit = bool(outside.g2 > ADMIT_RATIO**2 * spread or outside.count < FEW * inside.count)
+        admit = bool(outside.g2 > admit_ratio**2 * spread or outside.count < few * inside.count)
         count, g_sum = (inside.count, inside.g)
         if admit:
             count, g_sum = inside.count + outside.count, inside.g + outside.g
@@ -344,12 +355,13 @@ class ConstrainedCG:
         return sums[0], sums[1]
 
     def preconditioned_residual(
-        self, closure: Any, admit: bool, count: float, g_sum: float
+        self, closure: Any, admit: bool, count: float, g_sum: float, *, slight_change: float = 0.001
     ) -> tuple[Array, float, float]:
         """Return z (3, 4), the constant to subtract from it, and beta (5).
 
-        Force control: its mean. Closure control of a periodic body: minus the uniform pressure that closes
-        the mean gap.
+        The constant is the mean of z under force control; under closure control of a periodic body minus the
+        uniform pressure that closes the mean gap. `slight_change` is the share of the free set that may
+        change without loss of the conjugacy.
         """
         shift = self.dtype(g_sum / count if self.force_controlled else 0.0)
         bin_columns, free = self.preconditioner.bin_columns, self.free_set
@@ -371,7 +383,7 @@ class ConstrainedCG:
         z_sum, z_g, t_sum = self.pass_sums(_kernels.add_bins, bin_columns, free.mask, extra, *arrays)[:3]
         mean = z_sum / count if self.force_controlled else -self.uniform_pressure(g_sum)
         G_old, self.G = self.G, float(z_g - mean * g_sum)  # (5), z with its mean taken off
-        beta = self.G / G_old if changes <= SLIGHT_CHANGE * count and G_old > 0 else 0.0
+        beta = self.G / G_old if changes <= slight_change * count and G_old > 0 else 0.0
         # the part of the last direction that is kept must not change the force either
         return plane, mean + (beta * t_sum / count if self.force_controlled else 0.0), beta
 
@@ -436,14 +448,21 @@ class ConstrainedCG:
         rest = sum_by_rows(np.where(free, 0, self.p))
         self.work_array[free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
 
-    def overshot(self, evaluation: Evaluation, progress: Progress) -> bool:
+    def overshot(
+        self,
+        evaluation: Evaluation,
+        progress: Progress,
+        *,
+        max_halvings: int = 20,  # a factor 1e-6; none in 206 solutions with and without p_max
+        stalled: int = 10,  # iterations without progress; with 50 150 surfaces with spikes converge as well
+    ) -> bool:
         """Return whether the last projected step has raised the objective and can be halved."""
-        if not self.projected or self.halvings >= MAX_HALVINGS:
+        if not self.projected or self.halvings >= max_halvings:
             return False
         # Near a stall, require a strict decrease; otherwise nodes may enter and leave in a cycle at constant
         # objective.
         rounding = 8 * self.epsilon * evaluation.objective_size
-        slack = rounding if progress.stalled < STALLED else -rounding
+        slack = rounding if progress.stalled < stalled else -rounding
         return evaluation.objective > self.last_objective + slack
 
     def backtrack(self) -> None:
@@ -486,10 +505,3 @@ def subtract_and_clip(
                 band *= factor
             if p_max < np.inf:
                 np.minimum(band, p_max, out=band)
-
-
-def strips(first: int, stop: int, columns: int) -> Iterator[slice]:
-    """Yield slices of a few rows."""
-    rows = max(1, STRIP // columns)
-    for row in range(first, stop, rows):
-        yield slice(row, min(row + rows, stop))

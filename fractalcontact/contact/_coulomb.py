@@ -42,27 +42,10 @@ import numpy as np
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import SLIP, STICK
 from fractalcontact.contact._load_path import Step
-from fractalcontact.contact._tangential_operator import (
-    LOCAL_STIFFNESS,
-    TangentialOperator,
-    TangentialPreconditioner,
-)
+from fractalcontact.contact._tangential_operator import TangentialOperator, TangentialPreconditioner
 
-# a step on rough contacts took 22 conjugate gradients at most in all, and at most 7 for one linear system
-# (192 steps, nu 0, .2 and .5, periodic and free, up to .99 of sliding): these end what does not converge
-MAX_ITERATIONS = 100
-MAX_INNER = 40
 # relative distance from the circle at which a node is on it; 1e-14 gave the same bits on rough contacts
 AT_BOUND = 1e-12
-FORCING = 0.1  # part of the residual that (3) may leave; with 0.3 and more some steps fail and cost more
-# and over the residual, so that the iteration converges faster than linearly; 10 took 3 % more transforms
-FORCING_GROWTH = 100.0
-LAST_SHARE = 0.3  # of the tolerance, beyond which (3) is not solved; .1 took 2 % more, .9 took 3 % less
-MAX_CUTS = 3  # of a step to a quarter; 1 and 5 took the same transforms on rough contacts
-# residual over the last one from which a shorter step is tried as well; .4 and .95 took the same transforms
-SLOW = 0.7
-# reduction of the root of its error; .001 took 7 % more transforms, .1 took 8 % less
-STIFFNESS_FORCING = 0.01
 # relative determinant from which all slipping nodes move along one line; 1e-14 and 1e-9 gave the same bits
 PARALLEL = 1e-12
 
@@ -103,13 +86,20 @@ class CoulombSolver:
 
     def __init__(self, operator: TangentialOperator, bound: Array, scale: float, tolerance: float) -> None:
         self.operator, self.bound, self.scale, self.tolerance = operator, bound, scale, tolerance
-        self.node_stiffness = LOCAL_STIFFNESS / float(np.sqrt(operator.body.cell_area))
+        self.node_stiffness = operator.node_stiffness
 
-    def step(self, slip: Array, force: Array, start: Array) -> CoulombState:
+    def step(
+        self,
+        slip: Array,
+        force: Array,
+        start: Array,
+        *,
+        max_iterations: int = 100,  # 192 steps on rough contacts took 22 conjugate gradients at most in all
+    ) -> CoulombState:
         """Minimise (1) with the slip before the step, from a traction `start`."""
         q = project(start, self.bound, force)
         state, iterations = self.evaluate(q, self.operator.apply(q), slip), 0
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(max_iterations):
             if state.residual <= self.tolerance:
                 break
             better, inner = self.newton_step(state, slip, force)
@@ -135,16 +125,31 @@ class CoulombSolver:
         objective = float(np.sum(q * (u / 2 + slip)))
         return CoulombState(q, u, g, slips, displacement, objective, residual)
 
-    def newton_step(self, state: CoulombState, slip: Array, force: Array) -> tuple[CoulombState | None, int]:
-        """Take a step of (3) to (5); None if no share of it is better. Also the conjugate gradients."""
-        forcing = min(FORCING, FORCING_GROWTH * state.residual)
-        goal = max(forcing * state.residual, LAST_SHARE * self.tolerance) * self.scale
+    def newton_step(
+        self,
+        state: CoulombState,
+        slip: Array,
+        force: Array,
+        *,
+        forcing: float = 0.1,  # with .3 and more some steps fail and cost more
+        forcing_growth: float = 100.0,  # faster than linear convergence; 10 took 3 % more transforms
+        last_share: float = 0.3,  # .1 took 2 % more, .9 took 3 % less
+        slow: float = 0.7,  # .4 and .95 took the same transforms
+        max_cuts: int = 3,  # 1 and 5 took the same transforms on rough contacts
+    ) -> tuple[CoulombState | None, int]:
+        """Take a step of (3) to (5); None if no share of it is better. Also the conjugate gradients.
+
+        (3) leaves the part `forcing` of the residual, less once that is small, and the part `last_share` of
+        the tolerance. While the residual stays above `slow` of the last one a quarter of the step is tried.
+        """
+        part = min(forcing, forcing_growth * state.residual)
+        goal = max(part * state.residual, last_share * self.tolerance) * self.scale
         direction = state.direction
         system = TangentSystem(self.operator, direction, state.compliance)
         d, moved, inner = system.solve(-state.g, np.eye(2), lambda r, _: self.size(r) <= goal)
         share = 1.0
         best: CoulombState | None = None
-        for _ in range(MAX_CUTS + 1):
+        for _ in range(max_cuts + 1):
             y, v = state.q + share * d, state.u + slip + share * moved
             g = v - multiplier(v, self.bound, direction)[:, None]
             z = y - share * self.node_stiffness * g
@@ -159,7 +164,7 @@ class CoulombSolver:
                 break
             if lower or trial.residual < state.residual:
                 best = trial
-            if trial.residual < SLOW * state.residual:
+            if trial.residual < slow * state.residual:
                 break
             share /= 4
         return best, inner
@@ -168,7 +173,13 @@ class CoulombSolver:
         """Return the part of the residual that an error r of the displacement makes."""
         return float(np.sum(self.bound * np.hypot(*r)))
 
-    def stiffness(self, state: CoulombState, unit: Array) -> float:
+    def stiffness(
+        self,
+        state: CoulombState,
+        unit: Array,
+        *,
+        forcing: float = 0.01,  # of the root of its error; .001 took 7 % more transforms, .1 took 8 % less
+    ) -> float:
         """Return the increment of force along `unit` over that of displacement, without force across.
 
         The sticking nodes move as one, and the slipping ones along their circles.
@@ -176,7 +187,7 @@ class CoulombSolver:
         system = TangentSystem(self.operator, state.direction, state.compliance)
         across = np.array([[-unit[1]], [unit[0]]])
         right = unit[:, None] * np.ones_like(state.q)
-        d, _, _ = system.solve(right, across, lambda _, fall: fall <= STIFFNESS_FORCING)
+        d, _, _ = system.solve(right, across, lambda _, fall: fall <= forcing)
         return float(d.sum(1) @ unit)
 
 
@@ -187,7 +198,14 @@ class TangentSystem:
         self.operator, self.direction, self.compliance = operator, direction, compliance
         self.preconditioner = TangentialPreconditioner(operator, direction, compliance)
 
-    def solve(self, right: Array, fixed: Array, is_solved: Any) -> tuple[Array, Array, int]:
+    def solve(
+        self,
+        right: Array,
+        fixed: Array,
+        is_solved: Any,
+        *,
+        max_iterations: int = 40,  # 7 at most in the same 192 steps: it ends what does not converge
+    ) -> tuple[Array, Array, int]:
         """Solve (K + C) d = right by preconditioned conjugate gradients; return d, K d and the iterations.
 
         The columns of `fixed` (2, n) are the directions in which the sum of d is zero. Stops once
@@ -212,7 +230,7 @@ class TangentSystem:
         z = project_out(self.preconditioner.apply(r))
         t, rz = z, float(np.sum(r * z))
         first = rz
-        for iteration in range(MAX_INNER):
+        for iteration in range(max_iterations):
             if rz <= 0:  # nothing is left but rounding
                 return d, moved, iteration
             kt = operator.apply(t)
@@ -228,7 +246,7 @@ class TangentSystem:
             if is_solved(r, math.sqrt(max(rz, 0.0) / first)):
                 return d, moved, iteration + 1
             t = z + rz / old * t
-        return d, moved, MAX_INNER
+        return d, moved, max_iterations
 
 
 def multiplier(v: Array, bound: Array, direction: Array) -> Array:

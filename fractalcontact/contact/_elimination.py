@@ -24,7 +24,6 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact._scaled_problem import Control, Problem, Solution
 
-MAX_NODES = 8192  # of the dense system: half a gigabyte
 # of one step: each round removes a node at least, and a dozen are usual; a step that takes more is reported
 # as "iteration_limit"
 MAX_ROUNDS = 1000
@@ -188,14 +187,14 @@ def solve_closure(influence: InfluenceMatrix, closure: float) -> Balance:
         force = max(force + miss / balance.rate, force / 16)
 
 
-def check_size(nodes: int) -> None:
+def check_size(nodes: int, *, most: int = 8192) -> None:  # a matrix of half a gigabyte
     """Refuse a dense system that would not fit.
 
     `press` cannot check this beforehand: under an imposed force the number of nodes that may touch is known
     only once the closure is.
     """
-    if nodes > MAX_NODES:
-        expected = f"'fast' for more than {MAX_NODES} nodes that may touch"
+    if nodes > most:
+        expected = f"'fast' for more than {most} nodes that may touch"
         raise InvalidInput(
             "fractalcontact.contact.press", [f"method: expected {expected}, got 'elimination' with {nodes}"]
         )

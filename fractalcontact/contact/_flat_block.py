@@ -20,9 +20,6 @@ from fractalcontact.contact._options import BOUNDARIES, ContactOptions
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner
 from fractalcontact.contact._scaled_problem import Body, length_unit, mean_by_rows, scaled_body, sum_by_rows
 
-MAX_ITERATIONS = 500  # 11 to 17 are usual, 26 for 3 x 400 nodes
-TARGET = 1e-14  # spread of the displacement over its mean at which the solve stops: what rounding leaves
-
 
 def flat_stiffness(
     shape: tuple[int, int],
@@ -124,15 +121,16 @@ class FlatBlock:
     iterations: int
     transforms: int
     residual: float
-
-    @property
-    def stopped_by(self) -> str:
-        """What ended the iteration above a tolerance that the residual exceeds."""
-        return "rounding" if self.iterations < MAX_ITERATIONS else "iteration_limit"
+    stopped_by: str = "rounding"  # what ended the iteration above a tolerance that the residual exceeds
 
 
 @lru_cache(maxsize=4)
-def flat_block(body: Body) -> FlatBlock:
+def flat_block(
+    body: Body,
+    *,
+    target: float = 1e-14,  # spread of the displacement over its mean: what rounding leaves
+    max_iterations: int = 500,  # 11 to 17 are usual, 26 for 3 x 400 nodes
+) -> FlatBlock:
     """Solve K p = const, sum p = 1, by preconditioned conjugate gradients on the whole plane.
 
     The symbols are those of `_constrained_cg`; here every node is free.
@@ -145,13 +143,13 @@ def flat_block(body: Body) -> FlatBlock:
     u = operator.apply(p)
     t, G, best = np.zeros_like(p), 0.0, (np.inf, p, u)
     iteration = 0
-    while iteration < MAX_ITERATIONS:
+    while iteration < max_iterations:
         closure = sum_by_rows(p * u) / sum_by_rows(p)
         g = u - closure
         error = float(np.abs(g).max()) / closure
         if error < best[0]:
             best = (error, p, u)
-        if error <= TARGET or error > 1e3 * best[0]:
+        if error <= target or error > 1e3 * best[0]:
             break
         g -= mean_by_rows(g)
         z = preconditioner.apply_to_all(g)
@@ -167,7 +165,8 @@ def flat_block(body: Body) -> FlatBlock:
     u = operator.apply(p)
     compliance = sum_by_rows(p * u)
     error = float(np.abs(u - compliance).max()) / compliance
-    return FlatBlock(p, u, compliance, iteration, round(operator.transforms), error)
+    stopped_by = "rounding" if iteration < max_iterations else "iteration_limit"
+    return FlatBlock(p, u, compliance, iteration, round(operator.transforms), error, stopped_by)
 
 
 @lru_cache(maxsize=16)

@@ -14,11 +14,6 @@ import numpy as np
 from fractalcontact.base.numbers import Array
 
 DISC_RADII = ("second_order", "inscribed", "equal_area")
-# of the spacings, up to which the second-order radius exists, and plates of equal area leave the elastic
-# operator positive: its least value over that of the half-space is .30 there, and -.09 at 2.5
-GREATEST_RATIO = 2.0
-SQUARE_RADIUS = 0.4365941077293225  # the second-order radius on a square grid
-NEAR = 12  # cells summed one by one before the tail of a lattice sum; 8 and 20 give the same radius to 3e-16
 
 
 def disc_coefficients(shape: tuple[int, int], spacing: tuple[float, float], radius: float) -> Array:
@@ -79,10 +74,10 @@ def second_order_radius(ratio: float) -> float:
     """Return the radius, over the root of the cell area, that makes the plates second-order accurate.
 
     It is the smaller root of a lattice sum: under uniform pressure the plates are displaced as much as the
-    half-space is. For equal spacings it is a constant.
+    half-space is.
     """
-    if ratio == 1.0:
-        return SQUARE_RADIUS
+    if ratio == 1.0:  # the usual case: the root that is found below, to the last digit but one
+        return 0.4365941077293225
     from scipy.optimize import brentq
 
     smallest = 1.0 / np.sqrt(ratio)
@@ -96,17 +91,24 @@ def second_order_radius(ratio: float) -> float:
     return float(root)
 
 
-def local_excess(radius: float, ratio: float) -> float:
-    """Return the displacement under unit pressure beyond that of the half-space; cell area and modulus 1."""
-    distance = _lattice(ratio, NEAR)
+def local_excess(
+    radius: float,
+    ratio: float,
+    near: int = 12,  # 8 and 20 give the same radius to 3e-16
+) -> float:
+    """Return the displacement under unit pressure beyond that of the half-space; cell area and modulus 1.
+
+    Cells up to `near` away are summed one by one, the tail by lattice sums.
+    """
+    distance = _lattice(ratio, near)
     tail = 0.0
     coefficient = 1.0  # of x^(2k+1) in asin x
     for k in range(1, 7):
         coefficient *= (2 * k - 1) ** 2 / (2.0 * k * (2 * k + 1))
         far = epstein_zeta(2 * k + 1, ratio) - float(np.sum(distance ** -(2.0 * k + 1)))
         tail += coefficient * radius ** (2 * k) * far
-    near = float(np.sum(np.arcsin(np.minimum(radius / distance, 1.0)) / radius - 1.0 / distance))
-    return 0.5 / radius + (epstein_zeta(1, ratio) + near + tail) / np.pi
+    cells = float(np.sum(np.arcsin(np.minimum(radius / distance, 1.0)) / radius - 1.0 / distance))
+    return 0.5 / radius + (epstein_zeta(1, ratio) + cells + tail) / np.pi
 
 
 @lru_cache(maxsize=512)

@@ -29,20 +29,13 @@ from fractalcontact.contact._scaled_problem import (
     make_units,
     mean_by_rows,
     scaled_body,
+    strips,
     sum_by_rows,
 )
 
 if TYPE_CHECKING:
     from fractalcontact.contact._elimination import Elimination
     from fractalcontact.contact._window_solver import WindowSolver
-
-
-ROWS = 64  # of a plane at a time: half a megabyte at n = 1024, in the place of one more plane
-# greatest share of an imposed force that the pressures may miss
-FORCE_TOLERANCE = 1e-9
-# of the punch: on rough surfaces of 128 x 128 nodes its stiffness is off by up to 2e-5; .03 left 4e-4 for 3 %
-# fewer transforms of a partial slip, .003 3e-6 for 2 % more
-PUNCH_TOLERANCE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -150,8 +143,7 @@ class Step:
     def mean_gap(self) -> float:
         """Mean gap in m."""
         solution, gap, row_sums = self.solution, self.problem.gap, []
-        for first in range(0, gap.shape[0], ROWS):  # the gap of the whole plane would be one more array
-            rows = slice(first, first + ROWS)
+        for rows in strips(0, *gap.shape):  # the gap of the whole plane would be one more array
             scaled = gap[rows] + solution.displacement[rows] - solution.closure
             is_open = solution.pressure[rows] <= 0
             row_sums.append(np.sum(np.maximum(scaled, 0.0), axis=1, where=is_open))
@@ -181,7 +173,12 @@ def scaled_path(
     )
 
 
-def solve_path(path: ScaledPath, guess: Callable[[float], Array | None] | None = None) -> Iterator[Step]:
+def solve_path(
+    path: ScaledPath,
+    guess: Callable[[float], Array | None] | None = None,
+    *,
+    force_tolerance: float = 1e-9,  # share of an imposed force that the pressures may miss
+) -> Iterator[Step]:
     """Yield the steps of a path as they are solved.
 
     `guess` returns the scaled pressure from which the fast method starts under an imposed value; without it,
@@ -202,7 +199,7 @@ def solve_path(path: ScaledPath, guess: Callable[[float], Array | None] | None =
             closure, imposed = value, force
         else:
             closure, imposed = (solution.closure + history.first_touch) * path.units.height, value
-        if abs(force - imposed) > FORCE_TOLERANCE * imposed:
+        if abs(force - imposed) > force_tolerance * imposed:
             solution = replace(solution, reason="force_missed")
         step = Step(solution, problem, path, closure, imposed, perf_counter() - start, history)
         yield step
@@ -282,7 +279,14 @@ def flat_contact(problem: Problem, control: Control, tolerance: float) -> Soluti
     )
 
 
-def press_punch(step: Step, guess: Array | None) -> Step | None:
+def press_punch(
+    step: Step,
+    guess: Array | None,
+    *,
+    # on rough surfaces of 128 x 128 nodes the stiffness is off by up to 2e-5; .03 left 4e-4 for 3 % fewer
+    # transforms of a partial slip, .003 3e-6 for 2 % more
+    tolerance: float = 1e-2,
+) -> Step | None:
     """Press a punch with the contact of `step` as its base, from a pressure; None where there is no contact.
 
     Its stiffness is that of the contact (Barber 2003): a node at the edge of a contact bears no pressure, so
@@ -299,7 +303,7 @@ def press_punch(step: Step, guess: Array | None) -> Step | None:
         control="normal_force",
         values=(step.force,),
         hardness=np.inf,
-        tolerance=max(step.path.tolerance, PUNCH_TOLERANCE),
+        tolerance=max(step.path.tolerance, tolerance),
     )
     return next(solve_path(path, lambda _: guess))
 

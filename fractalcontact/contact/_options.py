@@ -11,6 +11,7 @@ import numpy as np
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.references import PAPER, joined_references
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._scaled_problem import make_units
@@ -30,10 +31,6 @@ INFLUENCE_SOURCES = {
     "spectral": "Stanley and Kato, J. Tribol. 119:481 (1997)",
 }
 YASTREBOV = "Yastrebov, Anciaux and Molinari, Tribol. Int. 114:161 (2017) (perimeter correction)"
-# largest force, closure or hardness over its scale (its inverse is the smallest): products of three such
-# numbers must stay below 1e308
-LARGEST_RATIO = 2.0**300
-SCALE_RANGE = (2.0**-900, 2.0**900)  # of the scales in SI units: doubles end near 2**-1022 and 2**1024
 # relative: a force of hardness times area, or of sliding, may miss it by so much, and forces that differ by
 # less share one solution
 FORCE_ROUNDING = 1e-12
@@ -68,7 +65,7 @@ class ContactOptions:
     influence: str | None = None
     disc_radius: str = "second_order"
     hardness: float | None = None
-    tolerance: float = 1e-8  # from 1e-5 on the area is that of the solution (page theory_contact)
+    tolerance: float = DEFAULT_TOLERANCE
     method: str = "fast"
 
     def __post_init__(self) -> None:
@@ -132,7 +129,9 @@ class ContactOptions:
             problems.require(influence in ("disc", "square"), "influence", expected, influence)
         if influence == "disc":
             ratio = max(grid.spacing) / min(grid.spacing)
-            fits = self.disc_radius == "inscribed" or ratio <= _influence.GREATEST_RATIO * (1 + UNIFORM)
+            # beyond 2 there is no second-order radius, and with plates of equal area the elastic operator is
+            # not positive: its least value over that of the half-space is .30 at 2, and -.09 at 2.5
+            fits = self.disc_radius == "inscribed" or ratio <= 2.0 * (1 + UNIFORM)
             expected = "'square', or disc_radius='inscribed', for spacings in a ratio above 2"
             problems.require(fits, "influence", expected, f"'disc' with a ratio of {ratio:.4g}")
         else:
@@ -229,6 +228,9 @@ def check_scale(
     contact_modulus: float,
     options: ContactOptions,
     load: LoadPath,
+    *,
+    greatest_scale: float = 2.0**900,  # or least, its inverse, in SI units: doubles end near 2**1024
+    greatest_ratio: float = 2.0**300,  # of load or hardness to its scale: a double holds products of three
 ) -> bool:
     """Check that heights, modulus, hardness and load are in proportion, so that no product overflows."""
     hardness = options.hardness
@@ -245,19 +247,19 @@ def check_scale(
     }
     before = len(problems.messages)
     for product, (scale, unit_name) in scales.items():
-        if not SCALE_RANGE[0] < scale < SCALE_RANGE[1]:
+        if not 1 / greatest_scale < scale < greatest_scale:
             expected = "spacing, heights and modulus whose products a double can hold"
             problems.add("surface / contact_modulus", expected, f"{product} = {scale:.3g} {unit_name}")
             return False
     if hardness is not None:
-        low, high = units.pressure / LARGEST_RATIO, units.pressure * LARGEST_RATIO
+        low, high = units.pressure / greatest_ratio, units.pressure * greatest_ratio
         expected = f"None or between {low:.3g} and {high:.3g} Pa for this surface"
         problems.require(low < hardness < high, "hardness", expected, f"{hardness:g} Pa")
     unit = units.height if control == "closure" else units.force
     scale = unit / (grid.nominal_area if load.control == "nominal_pressure" else 1.0)
-    low, high, unit_name = scale / LARGEST_RATIO, scale * LARGEST_RATIO, CONTROL_UNITS[load.control]
+    low, high, unit_name = scale / greatest_ratio, scale * greatest_ratio, CONTROL_UNITS[load.control]
     expected = f"0 or between {low:.3g} and {high:.3g} {unit_name} for this surface and modulus"
     for given, value in zip(load.values, values, strict=True):
-        in_range = value == 0 or unit / LARGEST_RATIO < value < unit * LARGEST_RATIO
+        in_range = value == 0 or unit / greatest_ratio < value < unit * greatest_ratio
         problems.require(in_range, load.control, expected, f"{given:g} {unit_name}")
     return len(problems.messages) == before

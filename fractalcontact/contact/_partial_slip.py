@@ -15,6 +15,7 @@ from fractalcontact.base.compass import check_direction, read_direction
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_problem
 from fractalcontact.contact.solver import (
@@ -61,7 +62,7 @@ def partial_slip(
     boundary: str | None = None,
     influence: str | None = None,
     disc_radius: str = "second_order",
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
     keep: Sequence[str] = ("slip_state",),
     progress: bool = False,
 ) -> xr.Dataset:

@@ -30,12 +30,11 @@ from fractalcontact.base.threads import in_bands
 from fractalcontact.contact._operator import PairSum, WavenumberMultiplier
 from fractalcontact.contact._scaled_problem import Body
 
-# Transforms of solutions at three loads on rough surfaces of 128 x 128 nodes (tolerance 1e-8), periodic and
-# free, over those with these values (26.7 and 19.5):
-BIN = 4  # nodes along the edge of a bin, for equal spacings; 2 (4 times the bins): .96 .93, 8: 1.06 1.08
+# The numbers here and of `bin_edge` and `padded_plane` are measured by the transforms of solutions at three
+# loads on rough surfaces of 128 x 128 nodes (tolerance 1e-8), periodic and free, over those with these values
+# (26.7 and 19.5).
 DECAY = 0.65  # decay length of the kernel, in bins; .4: 1.09 1.06, 1: .96 .95
 FADE = 0.04  # far from the set; .01: 1.19 1.24, .16: .93 .97
-MARGIN = 8  # a free body has n/MARGIN more nodes for the extension beyond its edges; 4 and 16: 1
 
 
 @dataclass
@@ -207,16 +206,26 @@ def stiffness_table(body: Body) -> Array:
     return np.ascontiguousarray(waves.apply(impulse, 0.5, invert=False, mean=1.0 / extent)[:ny, :nx])
 
 
-def bin_edge(body: Body, axis: int) -> int:
+def bin_edge(
+    body: Body,
+    axis: int,
+    *,
+    nodes: int = 4,  # 2 (4 times the bins): .96 .93, 8: 1.06 1.08
+) -> int:
     """Return the nodes along the edge of a bin: a power of two, near square, and not too few bins."""
     mean = float(np.sqrt(body.spacing[0] * body.spacing[1]))
-    wanted = min(2 * BIN, round(BIN * mean / body.spacing[axis]), body.shape[axis] // 8)
+    wanted = min(2 * nodes, round(nodes * mean / body.spacing[axis]), body.shape[axis] // 8)
     return 1 << (max(1, wanted).bit_length() - 1)
 
 
-def padded_plane(n: int, edge: int) -> int:
-    """Return the length of a free body's plane: a margin for the extension, whole bins, fast transforms."""
-    bins = -(-(n + max(n // MARGIN, 2 * edge)) // edge)
+def padded_plane(
+    n: int,
+    edge: int,
+    *,
+    margin: int = 8,  # 4 and 16: 1
+) -> int:
+    """Return the length of a free body's plane: a margin of n / margin, whole bins, fast transforms."""
+    bins = -(-(n + max(n // margin, 2 * edge)) // edge)
     while fft.fast_length(bins * edge) != bins * edge:
         bins += 1
     return bins * edge

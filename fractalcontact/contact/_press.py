@@ -14,7 +14,7 @@ from fractalcontact.base.memory import Plane
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
+from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
 from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
@@ -25,17 +25,10 @@ UNDETERMINED = (
     "maximum_pressure", "area_share", "load_share",
 )  # fmt: skip
 BEYOND_REASON = "NaN where a periodic body is closed to its mean plane or beyond: no force is then determined"
-SMALL_PLANE = 512 * 512  # nodes up to which surfaces are pressed side by side, each on one thread
-# surfaces for each thread between two steps of the progress bar; 2 and 32 took 1.15 and .86 of the processor
-# time with 64 surfaces of 64 x 64 points, once each
-SIDE_BY_SIDE = 8
 INCLUDE = ("stiffness", "pressure_distribution")
 NO_STIFFNESS = (
     "NaN in complete contact of periodic bodies, which has no bound, and where no force is determined"
 )
-# bytes of a node: solver of a periodic and of a free body with the steps before, indentation, and the
-# solution that gives the stiffness
-PERIODIC_BYTES, FREE_BYTES, YIELD_BYTES, PUNCH_BYTES = 80.0, 188.0, 48.0, 72.0
 
 
 def _check(problems: Problems) -> None:
@@ -46,10 +39,10 @@ def _check(problems: Problems) -> None:
 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     """Return the bytes of the solver on the planes that are pressed at once."""
-    wraps = is_periodic(arguments.get("boundary"), plane.periodic)
-    node = PERIODIC_BYTES if wraps else FREE_BYTES
-    node += YIELD_BYTES if arguments.get("hardness") else 0.0
-    node += PUNCH_BYTES if "stiffness" in word_tuple(arguments.get("include")) else 0.0
+    # bytes of a node as measured: the solver with the steps before, indentation, one more solution
+    node = 80.0 if is_periodic(arguments.get("boundary"), plane.periodic) else 188.0
+    node += 48.0 if arguments.get("hardness") else 0.0
+    node += 72.0 if "stiffness" in word_tuple(arguments.get("include")) else 0.0
     return node * plane.cells / plane.planes * min(plane.planes, thread_count())
 
 
@@ -70,7 +63,7 @@ def press(
     influence: str | None = None,
     disc_radius: str = "second_order",
     hardness: float | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
     method: str = "fast",
     keep: Sequence[str] = ("state",),
     include: str | Sequence[str] = (),
@@ -178,12 +171,19 @@ def press(
 
 
 def _pressed_planes(
-    planes: Array, pressed: Callable[[Array, bool], Pressed], progress: bool
+    planes: Array,
+    pressed: Callable[[Array, bool], Pressed],
+    progress: bool,
+    *,
+    small: int = 512 * 512,  # nodes
+    # surfaces for each thread between two steps of the progress bar; 2 and 32 took 1.15 and .86 of the
+    # processor time with 64 surfaces of 64 x 64 points, once each
+    side_by_side: int = 8,
 ) -> list[Pressed]:
     """Press all planes: small ones side by side on a thread each, large ones one after the other."""
     if len(planes) == 1:
         return [pressed(planes[0], progress)]
-    together = SIDE_BY_SIDE * thread_count() if planes[0].size <= SMALL_PLANE else 1
+    together = side_by_side * thread_count() if planes[0].size <= small else 1
     results: dict[int, Pressed] = {}
 
     def press_some(start: int, stop: int, first: int) -> None:

@@ -7,6 +7,7 @@ powers of two therefore changes no bit of the computation.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -157,6 +158,19 @@ def length_unit(spacing: tuple[float, float]) -> float:
 def power_of_two(value: float) -> float:
     """Return the power of two next above `value`; 1 for zero."""
     return float(np.ldexp(1.0, int(np.frexp(value)[1]))) if value > 0 else 1.0
+
+
+def strips(
+    first: int,
+    stop: int,
+    columns: int,
+    *,
+    nodes: int = 1 << 17,  # they stay in the cache; threads that take fewer wait for each other's calls
+) -> Iterator[slice]:
+    """Yield slices of some rows of a plane, of so many nodes."""
+    rows = max(1, nodes // columns)
+    for row in range(first, stop, rows):
+        yield slice(row, min(row + rows, stop))
 
 
 def sum_by_rows(plane: Array) -> float:

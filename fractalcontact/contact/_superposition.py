@@ -41,8 +41,6 @@ from fractalcontact.contact._options import FORCE_ROUNDING
 from fractalcontact.contact._tangential_operator import TangentialOperator
 
 METHODS = ("superposition", "full")
-ROUNDING = 1e-12  # of the least compliance of the plane: an even pressure on a periodic body moves nothing
-BELOW_SLIDING = 1e-6  # relative distance from sliding, where the full displacement grows without bound
 # of the displacement, by `superposition_error`: isotropic surfaces of 64 x 64 to 256 x 256 nodes had .004
 # (rms) at nu = .2 and .012 at .5, .036 at most; an anisotropy ratio of 2 had .036 at nu = .2
 ACCEPTABLE_ERROR = 0.03
@@ -73,9 +71,14 @@ class ShearPath:
         """Tangential over normal compliance, lambda."""
         return (2 - self.poisson) / (2 - 2 * self.poisson)
 
-    def slides(self, normal_force: float) -> bool:
+    def slides(
+        self,
+        normal_force: float,
+        *,
+        distance: float = 1e-6,  # relative, from sliding, where the full displacement grows without bound
+    ) -> bool:
         """Return whether a force reaches that of sliding, as far as the full method can tell."""
-        return not max(map(abs, self.forces)) <= self.friction * normal_force * (1 - BELOW_SLIDING)
+        return not max(map(abs, self.forces)) <= self.friction * normal_force * (1 - distance)
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,8 @@ def superposition_error(normal: Step, shear: ShearPath) -> float:
     It is the work of the traction q = mu p(P) on its displacement by (2), over that on its true one, less 1.
     """
     pressure = normal.solution.pressure[normal.contact]
-    least = ROUNDING * normal.problem.local_compliance * float(np.sum(pressure)) ** 2
+    # an even pressure on a periodic body moves nothing, but for rounding
+    least = 1e-12 * normal.problem.local_compliance * float(np.sum(pressure)) ** 2
     if shear.poisson == 0 or not normal.solution.work > least:
         return 0.0
     operator = TangentialOperator(normal.path.body, normal.contact, shear.poisson)

@@ -11,6 +11,8 @@ lambda = (2 - nu)/(2 (1 - nu)), e = nu/(2 (1 - nu)). In wave numbers that is 2/|
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fractalcontact.base import fft
@@ -19,14 +21,6 @@ from fractalcontact.base.threads import in_bands
 from fractalcontact.contact._operator import convolution_symbol, padded_length
 from fractalcontact.contact._preconditioner import DECAY, FADE, bin_edge, padded_plane
 from fractalcontact.contact._scaled_problem import Body
-
-CLOSED_FORM_REACH = 8  # cells; beyond, the closed form of a cell loses digits; 16 gives the same displacement
-# from a distance in cells on: points of the quadrature; half as many change the displacement by 2e-14, more
-# of them by nothing
-GAUSS_ORDERS = ((8, 8), (20, 5), (100, 3))
-# traction of a node that is displaced by 1 against its surroundings, times spacing: roughly, as it serves
-# preconditioner and first guess; .3 and 3 took up to 7 and 3 % more transforms
-LOCAL_STIFFNESS = 1.0
 
 
 class TangentialOperator:
@@ -44,6 +38,9 @@ class TangentialOperator:
             shape = (self.contact.shape[0], self.contact.shape[1])
             self.body = Body(shape, body.spacing, False, body.influence, body.radius)
         self.shape = self.body.shape
+        # traction of a node that is displaced by 1 against its surroundings: roughly, as it serves
+        # preconditioner and first guess; .3 and 3 times as much took up to 7 and 3 % more transforms
+        self.node_stiffness = 1.0 / float(np.sqrt(body.cell_area))
         self.nodes = np.flatnonzero(self.contact)
         self.transforms = 0  # pairs
         self.multiplier: WaveVectorMultiplier | ConvolutionMultiplier
@@ -141,15 +138,26 @@ def tangential_coefficients(body: Body, poisson: float) -> tuple[Array, Array, A
     return (1 + factor) * body.influence_table(), factor * cosine, factor * sine  # lambda = 1 + e
 
 
-def cell_anisotropy(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:
-    """Return the means of cos 2 theta/(pi r) and sin 2 theta/(pi r) over the cell at offset (i, j)."""
+def cell_anisotropy(
+    shape: tuple[int, int],
+    spacing: tuple[float, float],
+    *,
+    # half as many points change the displacement by 2e-14, more of them or the closed form up to 16 cells by
+    # nothing
+    orders: Sequence[tuple[int, int]] = ((8, 8), (20, 5), (100, 3)),
+) -> tuple[Array, Array]:
+    """Return the means of cos 2 theta/(pi r) and sin 2 theta/(pi r) over the cell at offset (i, j).
+
+    `orders` has distances in cells and the points of the quadrature from there on. Nearer cells take the
+    closed form, which loses digits with the distance.
+    """
     cosine, sine = np.empty(shape), np.empty(shape)
     i, j = np.arange(shape[0])[:, None], np.arange(shape[1])[None, :]
     reach = np.maximum(i * spacing[0], j * spacing[1]) / max(spacing)
-    near = np.nonzero(reach < CLOSED_FORM_REACH)
+    near = np.nonzero(reach < orders[0][0])
     cosine[near], sine[near] = _corner_sums(near[0] * spacing[0], near[1] * spacing[1], spacing)
-    limits = [*(limit for limit, _ in GAUSS_ORDERS[1:]), np.inf]
-    for (limit, order), stop in zip(GAUSS_ORDERS, limits, strict=True):
+    limits = [*(limit for limit, _ in orders[1:]), np.inf]
+    for (limit, order), stop in zip(orders, limits, strict=True):
         points, weights = np.polynomial.legendre.leggauss(order)
         cells = np.nonzero((reach >= limit) & (reach < stop))
         total = np.zeros((2, cells[0].size))
@@ -213,7 +221,7 @@ class TangentialPreconditioner:
         self.mask = np.zeros(self.plane, dtype=np.bool_)
         self.mask.reshape(-1)[self.nodes] = True
 
-        stiffness = LOCAL_STIFFNESS / float(np.sqrt(body.cell_area))
+        stiffness = operator.node_stiffness
         slips = direction.any(axis=0)
         self.across = np.stack([-direction[1], direction[0]])
         share = 1 / (1 + compliance * stiffness)

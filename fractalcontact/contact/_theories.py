@@ -22,22 +22,12 @@ THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas", "hertz")
 # contact fraction beyond which asperities no longer deform independently: a choice, for greenwood_williamson
 # leaves `press` slowly; its area is .86 of that at a fraction of .012, .77 at .04, .71 at .11, .65 at .33
 SMALL_CONTACT = 0.05
-GAMMA = 0.45  # gamma of Yang and Persson (2008): elastic energy over that of complete contact, at small loads
-FULL = 26.0  # argument of erf at which contact is complete: exp(-FULL^2) is the smallest number
-# of the flat from the mean summit, in standard deviations of the summits: F_3/2 from 23 down to 3e-286
-SEPARATIONS = (-8.0, 36.0)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)  # exp(-t^2) erf(t)^2 on 0 ... 7: error below 1e-13
-TAIL = 7.0  # exp(-t^2) beyond this is below 1e-21
 
 LAW = (
     f"greenwood_williamson and bush_gibson_thomas hold up to a contact fraction of {SMALL_CONTACT:g}, while "
     "asperities deform independently"
 )
-SMOOTH = 1e-3  # rms distance of a surface from a paraboloid, over its range: beyond, Hertz does not hold
-# curvature along a summit over that across it: the fit of a cylinder leaves 1e-16 of it, and the ratio of the
-# axes, found between 0 and 1 - 1e-12, holds up to 7e10
-CYLINDER = 1e-9
-ROUND = 1e-6  # squared eccentricity below which an ellipse is a circle: 1e-8 and 1e-4 gave the same areas
 PARABOLOID = (
     "hertz holds on one smooth summit (no cylinder) without periods, while the contact is inside the surface"
 )
@@ -222,7 +212,7 @@ def _persson(spectrum: Spectrum, pressure: Array) -> tuple[Array, Array, Array]:
     for i, p in enumerate(pressure):
         if p == 0:
             continue
-        t = np.minimum(math.sqrt(2) * p / s, FULL)
+        t = np.minimum(math.sqrt(2) * p / s, 26.0)  # contact is complete: exp(-26^2) is the smallest number
         separation, load_rate = _separation_integrals(t)
         gap[i] = math.sqrt(2 / math.pi) * np.sum(np.diff(s * separation, prepend=0.0) * spectrum.length)
         compliance[i] = 2 / math.sqrt(math.pi) * np.sum(np.diff(load_rate, prepend=0.0) * spectrum.length)
@@ -231,18 +221,22 @@ def _persson(spectrum: Spectrum, pressure: Array) -> tuple[Array, Array, Array]:
     return area, gap, stiffness
 
 
-def _separation_integrals(start: Array) -> tuple[Array, Array]:
+def _separation_integrals(
+    start: Array,
+    gamma: float = 0.45,  # Yang and Persson (2008)
+    tail: float = 7.0,  # beyond it exp(-t^2) is below 1e-21
+) -> tuple[Array, Array]:
     """Return the integrals of F(t) (1/t - start/t^2) and of F(t)/t^2 from `start` to infinity.
 
-    The part with gamma is in closed form, the rest is regular at 0. The second is minus the derivative of the
-    first by `start`.
+    The part with gamma, the elastic energy over that of complete contact at small loads, is in closed form,
+    the rest is regular at 0. The second is minus the derivative of the first by `start`.
     """
     small = np.exp(-(start**2)) / start - math.sqrt(math.pi) * special.erfc(start)
-    first = GAMMA * (0.5 * special.exp1(start**2) - start * small)
-    second = GAMMA * small
-    half = 0.5 * np.maximum(TAIL - start, 0.0)[:, None]
+    first = gamma * (0.5 * special.exp1(start**2) - start * small)
+    second = gamma * small
+    half = 0.5 * np.maximum(tail - start, 0.0)[:, None]
     t = start[:, None] + half * (NODES + 1)
-    rest = 3 * (1 - GAMMA) * (special.erf(t) / t) ** 2 * np.exp(-(t**2)) * (half * WEIGHTS)
+    rest = 3 * (1 - gamma) * (special.erf(t) / t) ** 2 * np.exp(-(t**2)) * (half * WEIGHTS)
     return first + (rest * (t - start[:, None])).sum(axis=1), second + rest.sum(axis=1)
 
 
@@ -264,8 +258,8 @@ def _greenwood_williamson(spectrum: Spectrum, pressure: Array) -> tuple[Array, A
 
 
 def _summit_separation(load: float) -> float:
-    """Return t of F_3/2(t) = load; NaN outside `SEPARATIONS`."""
-    low, high = SEPARATIONS
+    """Return t of F_3/2(t) = load, of a flat t standard deviations above the mean summit; NaN outside."""
+    low, high = -8.0, 36.0  # F_3/2 from 23 down to 3e-286
     limits = _summit_integral(1.5, np.array([low, high]))
     if not limits[1] < load < limits[0]:
         return math.nan
@@ -282,7 +276,13 @@ def _summit_integral(order: float, t: Array) -> Array:
     return np.asarray(special.gamma(order + 1) / math.sqrt(2 * math.pi) * np.exp(-(t**2) / 4) * cylinder)
 
 
-def _hertz(heights: Array, grid: Grid, pressure: Array) -> tuple[Array, Array]:
+def _hertz(
+    heights: Array,
+    grid: Grid,
+    pressure: Array,
+    *,
+    least_m: float = 1e-6,  # below it an ellipse is a circle: 1e-8 and 1e-4 gave the same areas
+) -> tuple[Array, Array]:
     """Return contact fraction and stiffness (m-1) at pressures over E*, after Johnson (1985), section 4.2.
 
     The surface is -(A x^2 + B y^2) along the axes of a paraboloid, A <= B. The semi-axes a >= b of the
@@ -301,9 +301,9 @@ def _hertz(heights: Array, grid: Grid, pressure: Array) -> tuple[Array, Array]:
     def difference(m: float) -> float:
         return float(special.ellipk(m) - special.ellipe(m))
 
-    m = ROUND
-    if ratio_excess(ROUND) < 0:
-        m = float(optimize.brentq(ratio_excess, ROUND, 1 - 1e-12, xtol=1e-14))
+    m = least_m
+    if ratio_excess(least_m) < 0:
+        m = float(optimize.brentq(ratio_excess, least_m, 1 - 1e-12, xtol=1e-14))
     area = grid.nominal_area
     semi_axis = np.cbrt(1.5 * pressure * area * difference(m) / (math.pi * least * m))
     inside = semi_axis <= reach
@@ -312,7 +312,15 @@ def _hertz(heights: Array, grid: Grid, pressure: Array) -> tuple[Array, Array]:
     return np.where(inside, fraction, math.nan), np.where(inside, stiffness, math.nan)
 
 
-def _paraboloid(heights: Array, grid: Grid) -> tuple[float, float, float] | None:
+def _paraboloid(
+    heights: Array,
+    grid: Grid,
+    *,
+    misfit: float = 1e-3,  # rms distance of the surface, over its range: beyond, Hertz does not hold
+    # curvature along the summit over that across it: the fit of a cylinder leaves 1e-16 of it, and the ratio
+    # of the axes, found between 0 and 1 - 1e-12, holds up to 7e10
+    cylinder: float = 1e-9,
+) -> tuple[float, float, float] | None:
     """Return A, B (m-1) and the distance (m) of the summit from the edge; None where it is no paraboloid."""
     (ny, nx), (dy, dx) = grid.shape, grid.spacing
     half = 0.5 * max((ny - 1) * dy, (nx - 1) * dx)
@@ -322,13 +330,13 @@ def _paraboloid(heights: Array, grid: Grid) -> tuple[float, float, float] | None
     values, _, scale = shifted(heights)
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
     coefficients = np.linalg.lstsq(terms, values.ravel(), rcond=None)[0]
-    misfit = values.ravel() - terms @ coefficients
-    if math.sqrt(float(np.mean(misfit**2))) > SMOOTH * float(np.ptp(values)):
+    distance = values.ravel() - terms @ coefficients
+    if math.sqrt(float(np.mean(distance**2))) > misfit * float(np.ptp(values)):
         return None
     _, slope_x, slope_y, xx, xy, yy = coefficients
     curvature = -np.array([[xx, 0.5 * xy], [0.5 * xy, yy]])
     least, most = np.linalg.eigvalsh(curvature)
-    if least <= CYLINDER * most:
+    if least <= cylinder * most:
         return None
     summit = 0.5 * np.linalg.solve(curvature, [slope_x, slope_y])
     reach = float(min(x.max() - abs(summit[0]), y.max() - abs(summit[1]))) * half

@@ -32,24 +32,8 @@ WHOLE_PLANE = (slice(None), slice(None))
 # nodes from which single precision first saves a tenth of the time and more; at 384 x 384 it saves less than
 # its kernels, which double precision does not share, take to compile (3 s)
 SINGLE_FROM = 512 * 512
-# residual at which double precision takes over; 1e-6 and 3e-4 took as many transforms
-SINGLE_TOLERANCE = 3e-5
-SINGLE_RANGE = 1e20  # scaled pressures and closures up to which, and down to whose inverse, it may be used
-MAX_EXTRAPOLATION = 2.0  # along the path, in steps; .5 took 4 % more transforms, 8 the same
-# The five numbers of candidates, windows and margins below hardly matter: at light loads on 128 x 128 nodes 1
-# and 10 candidates along an edge, 64 and 512 first ones, windows of .5 and .95, margins of 1.02 and 1.3 and
-# tolerances of 1e-3 and .1 took the same time within its scatter of a fifth.
-# candidates up to which sums over pairs are faster than transforms: at most, and for each node along an edge
-FEW_NODES, FEW_ALONG_AN_EDGE, FEWEST = 1000, 4.5, 64
-FIRST_NODES = 256  # candidates of a first step under force control
-MAX_WINDOW_SHARE = 0.75  # of the extent; a larger window is not worth having
-CANDIDATE_TOLERANCE = 1e-2  # residual at which the closure is accurate enough to verify the candidates
-ROUNDING_SHARE = 1e-13  # of the greatest pressure: less is rounding; 1e-15 and 1e-11 gave the same bits
-LEAST_CLOSURE = 1e-100  # scaled: above the gap of the nodes where a surface is flat
-# of the area, over nominal pressure / (E* rms slope): theories have 1.6 to 2.5 (page theory_contact)
-# and 1 and 9 took 3 % more transforms
-CONTACT_SHARE = 3.0
-CLOSURE_MARGIN = 1.1  # candidates for this much more than the expected closure
+# candidates for this much more than the expected closure; 1.02 and 1.3 took the same time at light loads
+CLOSURE_MARGIN = 1.1
 
 
 class PastStep(NamedTuple):
@@ -112,10 +96,15 @@ class WindowSolver:
             return rough
         return replace(fine, closure=fine.closure + rough.closure)
 
-    def remove_rounding_pressure(self, solution: Solution) -> Solution:
+    def remove_rounding_pressure(
+        self,
+        solution: Solution,
+        *,
+        share: float = 1e-13,  # of the greatest pressure; 1e-15 and 1e-11 gave the same bits
+    ) -> Solution:
         """Unload the open nodes that bear no more than rounding, which an extrapolation may have left."""
         pressure = solution.pressure
-        tiny = (pressure > 0) & (pressure <= ROUNDING_SHARE * pressure.max(initial=0.0))
+        tiny = (pressure > 0) & (pressure <= share * pressure.max(initial=0.0))
         if not tiny.any():
             return solution
         is_open = self.problem.gap + solution.displacement > solution.closure
@@ -128,7 +117,12 @@ class WindowSolver:
 
     # where to start from
 
-    def extrapolated_pressure(self, control: Control) -> Array | None:
+    def extrapolated_pressure(
+        self,
+        control: Control,
+        *,
+        max_steps: float = 2.0,  # of the path; .5 took 4 % more transforms, 8 the same
+    ) -> Array | None:
         """Return the pressure extrapolated from the last two steps, linear in the log of the control."""
         if self._guess is not None:
             return self._guess
@@ -137,18 +131,23 @@ class WindowSolver:
         first, last = self.past_steps[0], self.past_steps[-1]
         if first.control != last.control:
             steps = np.log(control.value / last.control) / np.log(last.control / first.control)
-            if abs(steps) <= MAX_EXTRAPOLATION:
+            if abs(steps) <= max_steps:
                 return np.asarray(np.maximum(last.pressure + steps * (last.pressure - first.pressure), 0.0))
         return np.asarray(last.pressure * (control.value / last.control))
 
-    def extrapolated_closure(self, control: Control) -> float | None:
+    def extrapolated_closure(
+        self,
+        control: Control,
+        *,
+        least: float = 1e-100,  # scaled: above the gap of the nodes where a surface is flat
+    ) -> float | None:
         """Return the closure imposed, or extrapolated as a power of the force."""
         if control.closure is not None:
             return control.closure
         if not self.past_steps:
             if self._guess is None:
                 return None
-            return max(float(self.problem.gap[self._guess > 0].max()), LEAST_CLOSURE)
+            return max(float(self.problem.gap[self._guess > 0].max()), least)
         first, last = self.past_steps[0], self.past_steps[-1]
         power = 1.0
         if first.control != last.control:
@@ -157,8 +156,16 @@ class WindowSolver:
 
     # few nodes
 
-    def solve_on_nodes(self, control: Control) -> Solution | None:
-        """Solve by sums over pairs; None where there are too many candidates."""
+    def solve_on_nodes(
+        self,
+        control: Control,
+        *,
+        tolerance: float = 1e-2,  # 1e-3 and .1 took the same time at light loads
+    ) -> Solution | None:
+        """Solve by sums over pairs; None where there are too many candidates.
+
+        At the residual `tolerance` the closure is accurate enough to verify the candidates.
+        """
         few = self.few_nodes
         if np.count_nonzero(self.problem.gap <= self.closure_bound(control)) > few:
             return None
@@ -168,9 +175,9 @@ class WindowSolver:
             nodes = np.flatnonzero(self.problem.gap.ravel() <= self.sorted_gap()[count - 1])
             if nodes.size > few or not self.can_carry(nodes.size, control):
                 break  # many nodes at exactly this gap, or too few to carry the force below p_max
-            solution = self.pair_solution(nodes, control, start, CANDIDATE_TOLERANCE)
+            solution = self.pair_solution(nodes, control, start, tolerance)
             start = self.on_all_nodes(solution.pressure, nodes)
-            needed = self.count_below(solution.closure * (1 + CANDIDATE_TOLERANCE))
+            needed = self.count_below(solution.closure * (1 + tolerance))
             if control.closure is not None or needed <= nodes.size:
                 solution = self.pair_solution(nodes, control, start, self.tolerance)
                 return self.with_displacement(solution, self.on_all_nodes(solution.pressure, nodes))
@@ -180,7 +187,9 @@ class WindowSolver:
     @property
     def few_nodes(self) -> int:
         """Return the number of candidates up to which sums over pairs are faster than transforms."""
-        return min(FEW_NODES, max(FEWEST, int(FEW_ALONG_AN_EDGE * np.sqrt(self.problem.gap.size))))
+        along_an_edge = np.sqrt(self.problem.gap.size)
+        # 1 and 10 for each node along an edge took the same time on 128 x 128 nodes at light loads
+        return min(1000, max(64, int(4.5 * along_an_edge)))
 
     def closure_bound(self, control: Control) -> float:
         """Return the closure imposed, or that of a flat disc around the whole extent, a lower bound."""
@@ -194,13 +203,18 @@ class WindowSolver:
         """Return whether so many nodes carry twice the force below the largest pressure."""
         return control.force is None or nodes * self.problem.p_max > 2 * control.force
 
-    def first_node_count(self, control: Control) -> int:
-        """Return the number of candidates to begin with."""
+    def first_node_count(
+        self,
+        control: Control,
+        *,
+        unknown: int = 256,  # 64 and 512 took the same time at light loads
+    ) -> int:
+        """Return the number of candidates to begin with; `unknown` of them without a closure to expect."""
         if control.closure is not None:
             return self.count_below(control.closure)
         closure = self.extrapolated_closure(control)
         if closure is None:
-            return min(FIRST_NODES, self.few_nodes // 2, self.problem.gap.size)
+            return min(unknown, self.few_nodes // 2, self.problem.gap.size)
         expected = self.count_below(closure * CLOSURE_MARGIN)
         if expected > self.few_nodes and self.past_steps:
             expected = min(expected, 4 * self.count_below(self.past_steps[-1].closure))
@@ -282,7 +296,12 @@ class WindowSolver:
                 return self.with_displacement(solution, pressure)
             start, window = pressure, self.bounding_window(solution.closure)
 
-    def bounding_window(self, closure: float) -> Window:
+    def bounding_window(
+        self,
+        closure: float,
+        *,
+        largest: float = 0.75,  # of the extent; .5 and .95 took the same time at light loads
+    ) -> Window:
         """Return the box of the nodes whose gap is below `closure`, or the whole plane if not much larger."""
         near = self.problem.gap < closure
         box = []
@@ -292,20 +311,27 @@ class WindowSolver:
             step = max(1, n // 16)
             box.append(slice(first // step * step, min(n, -(-last // step) * step)))
         size = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
-        if size > MAX_WINDOW_SHARE * near.size or min(s.stop - s.start for s in box) < 3:
+        if size > largest * near.size or min(s.stop - s.start for s in box) < 3:
             return WHOLE_PLANE
         return box[0], box[1]
 
-    def solve_in_window(self, control: Control, window: Window, start: Array | None) -> Solution:
+    def solve_in_window(
+        self,
+        control: Control,
+        window: Window,
+        start: Array | None,
+        *,
+        single: float = 3e-5,  # residual at which double precision takes over; 1e-6, 3e-4: as many transforms
+    ) -> Solution:
         """Solve on a window of the plane, first in single and then in double precision."""
         if start is None:
             start = cold_start(self.problem, control)[0]
         part = self.part_inside(window)
         start = start if window == WHOLE_PLANE else start[window]
-        if first_precision(part, control) is np.float32 and self.tolerance < SINGLE_TOLERANCE:
+        if first_precision(part, control) is np.float32 and self.tolerance < single:
             run = ConstrainedCG(self.system(part, np.float32), control, start)
             del start  # each array that is kept longer than needed adds to the peak of the memory
-            rough = run.solve(SINGLE_TOLERANCE, certify=False)
+            rough = run.solve(single, certify=False)
             self.add_work(rough)
             start = rough.pressure
             del run, rough
@@ -342,10 +368,10 @@ def cold_start(problem: Problem, control: Control) -> tuple[Array, float]:
     """Return a pressure to start from without a step before, and roughly the closure to expect.
 
     Under an imposed closure the overlap. Under a force the root of the overlap with a plane that cuts off the
-    area of a rough contact: theories have that area proportional to the pressure over modulus and rms slope,
-    and the root is the profile of a contact of Hertz. From uniform pressure a solution takes a quarter to a
-    half more transforms. A start on coarser grids (nested iteration) saved a tenth of the transforms at 256 x
-    256 nodes and up to a third at 1024 x 1024, but no time (ratios of .92 to 1.14, 1.00 at 2048 x 2048).
+    area of a rough contact: the root is the profile of a contact of Hertz. From uniform pressure a solution
+    takes a quarter to a half more transforms. A start on coarser grids (nested iteration) saved a tenth of
+    the transforms at 256 x 256 nodes and up to a third at 1024 x 1024, but no time (ratios of .92 to 1.14,
+    1.00 at 2048 x 2048).
     """
     gap, size = problem.gap, problem.gap.size
     if control.closure is not None:
@@ -354,7 +380,8 @@ def cold_start(problem: Problem, control: Control) -> tuple[Array, float]:
         float(np.mean(np.square(np.diff(gap, axis=axis) / spacing)))
         for axis, spacing in enumerate(problem.body.spacing)
     )
-    share = CONTACT_SHARE * control.value / size / np.sqrt(square) if square > 0 else 1.0
+    # theories: area fraction 1.6 to 2.5 times pressure / (E* rms slope); 1 and 9 took 3 % more transforms
+    share = 3.0 * control.value / size / np.sqrt(square) if square > 0 else 1.0
     count = max(1, int(min(share, 1.0) * (size - 1)))
     plane = float(np.partition(gap, count, axis=None)[count])
     pressure = np.sqrt(np.maximum(plane - gap, 0.0))
@@ -369,11 +396,16 @@ def pair_tables(body: Body) -> tuple[Array, Array]:
 kept_pair_tables = lru_cache(maxsize=16)(pair_tables)
 
 
-def first_precision(problem: Problem, control: Control) -> Any:
+def first_precision(
+    problem: Problem,
+    control: Control,
+    *,
+    largest: float = 1e20,  # scaled pressure and closure: squares stay within the range of single precision
+) -> Any:
     """Return the type of a first solution: single precision where it saves time and its range is enough."""
     if problem.gap.size < SINGLE_FROM:
         return np.float64
     load = control.value if control.force is None else control.value / problem.gap.size
-    load_fits = 1 / SINGLE_RANGE < load < SINGLE_RANGE
-    bound_fits = problem.p_max == np.inf or 1 / SINGLE_RANGE < problem.p_max < SINGLE_RANGE
+    load_fits = 1 / largest < load < largest
+    bound_fits = problem.p_max == np.inf or 1 / largest < problem.p_max < largest
     return np.float32 if load_fits and bound_fits else np.float64

@@ -63,9 +63,6 @@ __all__ = [
 ]
 
 PRESSURE_CLASSES = 50  # of a distribution, from 0 to the greatest pressure: enough for a curve of a plot
-GREATEST_FRICTION = 1e3  # beyond that of any pair of bodies
-# of the superposition from which the full method starts; 1e-4 took 4 % more transforms
-START_TOLERANCE = 1e-2
 
 
 @dataclass(frozen=True)
@@ -267,8 +264,11 @@ def solve_shear(
     *,
     keep: Sequence[str] = (),
     progress: bool = False,
+    start_tolerance: float = 1e-2,  # 1e-4 took 4 % more transforms
 ) -> Sheared:
     """Press a surface under a load of one step, and shear it; arguments as for `solve`.
+
+    `start_tolerance` is that of the superposition from which the full method starts.
 
     Raises
     ------
@@ -293,7 +293,7 @@ def solve_shear(
         is_suitable = abs(error) <= ACCEPTABLE_ERROR or shear.slides(normal)
         method = "superposition" if is_suitable else "full"
     if method == "full":
-        steps = solve_reduced(path, reduced, first, START_TOLERANCE)
+        steps = solve_reduced(path, reduced, first, start_tolerance)
         next(steps)  # the first one
     wanted = ("traction_x",) if method == "full" else keep  # where the full method starts from
     superposition = Superposition(
@@ -328,8 +328,8 @@ def _solve_fully(
 
 def check_shear(problems: Problems, *, has_friction: bool = False) -> None:
     """Check friction, tangential forces, method and maps; `has_friction`: the bodies have a coefficient."""
-    friction = {"above": 0, "at_most": GREATEST_FRICTION}
-    problems.number("friction_coefficient", **friction, optional=has_friction)
+    # at most beyond that of any pair of bodies
+    problems.number("friction_coefficient", above=0, at_most=1e3, optional=has_friction)
     problems.numbers("tangential_force")
     problems.choice("method", among=METHODS, optional=True)
     problems.choices("keep", among=SLIP_MAPS)

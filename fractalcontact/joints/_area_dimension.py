@@ -15,6 +15,7 @@ from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._sheared_contact import (
@@ -65,7 +66,7 @@ def area_dimension(
     nominal_pressure: float | Sequence[float] | None = None,
     influence: str | None = None,
     hardness: float | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
 ) -> xr.Dataset:
     """Return the contact area of a sheared crack at several spacings of its heights, and its dimension.
 

@@ -10,7 +10,7 @@ import xarray as xr
 from fractalcontact.base.compass import is_single, read_directions
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS, STOP_REASONS
+from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import interpolation_errors
@@ -54,7 +54,7 @@ def closure(
     influence: str | None = None,
     disc_radius: str = "second_order",
     hardness: float | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
     method: str = "fast",
     progress: bool = False,
 ) -> xr.Dataset:

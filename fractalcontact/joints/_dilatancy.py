@@ -12,7 +12,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.polynomial import slopes
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS
+from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
@@ -62,7 +62,7 @@ def dilatancy(
     influence: str | None = None,
     disc_radius: str = "second_order",
     hardness: float | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
     method: str = "fast",
     progress: bool = False,
 ) -> xr.Dataset:

@@ -15,6 +15,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing
@@ -77,7 +78,7 @@ def partial_slip(
     method: str | None = None,
     influence: str | None = None,
     disc_radius: str = "second_order",
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
     keep: Sequence[str] = (),
     progress: bool = False,
 ) -> xr.Dataset:

@@ -14,6 +14,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.power_law import fit_line
 from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import POSITIVE
@@ -67,7 +68,7 @@ def self_weight(
     direction: str | float | Sequence[str | float] = COMPASS,
     influence: str | None = None,
     hardness: float | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = DEFAULT_TOLERANCE,
 ) -> xr.Dataset:
     """Return the shear strength of a joint under the weight of structures of several sizes.
 
