@@ -22,7 +22,6 @@ SOURCE = (
     "A 456:387 (2000); Yastrebov, Anciaux and Molinari, Tribology Int. 114:161 (2017) (correction)"
 )
 EXPONENTS = np.linspace(0.5, 2.0, 61)  # between which that of the stationary content is interpolated linearly
-SHIFTS = 4  # of the grid of squares: four exponents are within .008 of those of 16, with one within .020
 
 
 def _check(problems: Problems) -> None:
@@ -133,7 +132,11 @@ def _contact_fractions(planes: Planes) -> tuple[Array, Array]:
     return planes.occupied / cells, (planes.occupied - EXCESS_PER_EDGE * sides) / cells
 
 
-def stationary_exponents(stacks: Sequence[Planes]) -> Array:
+def stationary_exponents(
+    stacks: Sequence[Planes],
+    *,
+    shifts: int = 4,  # of the grid of squares: exponents are within .008 of those of 16, with one within .020
+) -> Array:
     """Return for each plane the largest exponent up to which its content does not fall with the resolution.
 
     `stacks` are the same domains on finer to coarser grids. At the exponent 2 the content is the area.
@@ -145,7 +148,7 @@ def stationary_exponents(stacks: Sequence[Planes]) -> Array:
         return np.full(stacks[0].count, np.nan)
     levels = int(np.ceil(np.log2(max(stacks[0].grid.shape))))
     contents = [
-        shifted_contents(planes, EXPONENTS, levels - int(doubling), SHIFTS).mean(1) * planes.side**EXPONENTS
+        shifted_contents(planes, EXPONENTS, levels - int(doubling), shifts).mean(1) * planes.side**EXPONENTS
         for planes, doubling in zip(stacks, np.rint(doublings), strict=True)
     ]
     with np.errstate(divide="ignore"):

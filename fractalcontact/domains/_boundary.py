@@ -18,21 +18,9 @@ from fractalcontact.domains._scaling_fit import dimension_variables, interval_no
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3; Bale and Schmidt, Phys. Rev. Lett. 53:596 (1984)"
 
-# pairs along the axes and along the diagonals, at a lag of one step and of two
-OFFSETS = np.array([(0, 1), (1, 0), (0, 2), (2, 0), (1, 1), (1, -1), (2, 2), (2, -2)], np.int64)
+# pairs along the axes and along the diagonals, at a lag of one step and then of two
+OFFSETS = np.kron([[1], [2]], [(0, 1), (1, 0), (1, 1), (1, -1)])
 LAGS = np.hypot(*OFFSETS.T)  # in cells
-SINGLE_LAG, DOUBLE_LAG = [0, 1, 4, 5], [2, 3, 6, 7]
-# a set with an interior holds whole blocks of cells: the edge of a block, and the least share of its cells
-# that lie in one. Measured on 540 level sets of Brownian surfaces and 58 sets without an interior: without
-# either block only .59 and .48 of the latter are refused, with half of either share all are; with the double
-# of the first share .867 of the level sets are accepted, of the second .880, with these .894
-SMALL_BLOCK, LARGE_BLOCK = (3, 0.1), (9, 0.06)
-# outside these dimensions the small block decides alone: smooth islands may be small, and rough ones hold no
-# large block (from 1 to 2: .769 accepted). From 1.4 to 1.75 only .48 without an interior are refused
-ROUGH = 1.3, 1.85
-# below this dimension blocks are not independent, and the error grows: without the factor the intervals hold
-# for .867 of level sets of 256 x 256 cells of dimension 1.1, with it for .925 (120 sets)
-SMOOTH, SMOOTH_FACTOR = 1.3, 2.0
 
 
 @public_result(title="Dimension of the boundary of a set", references=SOURCE, check=_masks.check_mask)
@@ -123,7 +111,22 @@ def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, A
     return pairs.reshape(-1, len(OFFSETS)), differing.reshape(-1, len(OFFSETS))
 
 
-def has_interiors(cells: Array, valid: Array | None, grid: Grid, dimension: float) -> bool:
+def has_interiors(
+    cells: Array,
+    valid: Array | None,
+    grid: Grid,
+    dimension: float,
+    *,
+    # edge of a block, and the least share of cells that lie in one. Measured on 540 level sets of Brownian
+    # surfaces and 58 sets without an interior: without either block only .59 and .48 of the latter are
+    # refused, with half of either share all are; with the double of the first share .867 of the level sets
+    # are accepted, of the second .880, with these .894
+    small: tuple[int, float] = (3, 0.1),
+    large: tuple[int, float] = (9, 0.06),
+    # outside these dimensions the small block decides alone: smooth islands may be small, and rough ones hold
+    # no large block (from 1 to 2: .769 accepted). From 1.4 to 1.75 only .48 without an interior are refused
+    rough: tuple[float, float] = (1.3, 1.85),
+) -> bool:
     """Return whether both the set and its complement hold whole blocks of cells.
 
     A set with an empty interior, as a carpet or a cluster of percolation, has holes at all scales: few of its
@@ -132,7 +135,7 @@ def has_interiors(cells: Array, valid: Array | None, grid: Grid, dimension: floa
     """
     if not np.isfinite(dimension):
         return True
-    blocks = [SMALL_BLOCK, LARGE_BLOCK] if ROUGH[0] <= dimension <= ROUGH[1] else [SMALL_BLOCK]
+    blocks = [small, large] if rough[0] <= dimension <= rough[1] else [small]
     observed = np.ones_like(cells) if valid is None else valid
     for part in (cells, cells ^ 1):
         own = part & observed
@@ -188,7 +191,7 @@ def _exponent(share: Array) -> Array:
     surface the boundary is crossed often, and reflects the tilt more than the roughness. A direction without
     a crossing has no weight; NaN if all are without.
     """
-    single, double = share[..., SINGLE_LAG], share[..., DOUBLE_LAG]
+    single, double = np.split(share, 2, axis=-1)
     crossed = single > 0
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = np.where(crossed, np.log2(double / single), 0.0)
@@ -197,7 +200,15 @@ def _exponent(share: Array) -> Array:
         return np.asarray((weights * logs).sum(-1) / weights.sum(-1))
 
 
-def fit_boundary_dimension(pairs: Array, differing: Array) -> tuple[float, float]:
+def fit_boundary_dimension(
+    pairs: Array,
+    differing: Array,
+    *,
+    # below this dimension blocks are not independent, and the error grows: without the factor the intervals
+    # hold for .867 of level sets of 256 x 256 cells of dimension 1.1, with it for .925 (120 sets)
+    smooth: float = 1.3,
+    smooth_factor: float = 2.0,
+) -> tuple[float, float]:
     """Return the dimension of the boundary and the half-width of its 95 % interval.
 
     The interval is from the delete-one-block jackknife, with the degrees of freedom that follow from the
@@ -219,7 +230,7 @@ def fit_boundary_dimension(pairs: Array, differing: Array) -> tuple[float, float
     if total == 0.0:
         return 2.0 - slope, 0.0
     error = np.sqrt((slopes.size - 1) / slopes.size * total)
-    error = error * (1.0 + SMOOTH_FACTOR * max(0.0, SMOOTH - (2.0 - slope)))
+    error = error * (1.0 + smooth_factor * max(0.0, smooth - (2.0 - slope)))
     freedom = max(total**2 / float((departure**2).sum()), 1.0)
     bend = slope - 0.5 * float(_exponent(1.0 - np.cos(np.pi * np.minimum(share, 0.5))))
     return 2.0 - slope, float(np.hypot(stdtrit(freedom, 0.975) * error, 1.5 * bend))

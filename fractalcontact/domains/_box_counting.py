@@ -20,18 +20,9 @@ from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import Fit
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (box dimension)"
-# Measured on 194 sets of known dimension, 100 to 512 cells a side: 1.000 of the intervals hold, their median
-# width is .326. Of the dimensions of two covers, up to which the difference widens the interval as it is:
-# with 0 .985 hold (width .286), with .05 all (.365), without a limit the width is .610
-COVER_DIFFERENCE = 0.02
-# of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the same
-# intervals hold (width .279), with half of it .985 (.301)
-BETWEEN_CLUSTERS = 0.06
-# share of the boxes from which on gaps between islands are bridged; .3 has 4 % more error, .7 the same
-SATURATED = 0.5
-NO_POWER_LAW = 0.15  # range of local slopes in a window: .69 of the sets are below, of .1 .60, of .2 .70
+# Numbers below are measured on 194 sets of known dimension, 100 to 512 cells a side: 1.000 of the intervals
+# hold, their median width is .326.
 BYTES = 6.0  # of a cell: the sums of the longest boxes on two threads, 5.1 as measured, and the mask
-MANY_SIZES, SOME_SIZES = 64, 48  # above so many sizes, some stand for all in the deviation of the null
 
 
 def _check_box_counts(problems: Problems) -> bool:
@@ -201,7 +192,7 @@ def analyse(
     )
     windows = [fit.window for fit in fits]
     null = _null(planes, sizes, windows, by_regression=by_regression)
-    steady = np.array([fit.slope_range <= NO_POWER_LAW for fit in fits])  # False for NaN
+    steady = np.array([fit.follows_power_law for fit in fits])
     ends = np.array([sizes[window][[0, -1]] for window in windows]) * planes.side
     ends = np.where(np.isfinite(dimension)[:, None], ends, np.nan)
     stops = np.array([window.stop for window in windows])
@@ -236,11 +227,19 @@ class WindowFit:
     slope_high: float
 
     @property
-    def slope_range(self) -> float:
-        return self.slope_high - self.slope_low
+    def follows_power_law(self) -> bool:
+        """Whether the local slopes are close to each other; False without any."""
+        # .69 of the sets are; within .1 .60, within .2 .70
+        return self.slope_high - self.slope_low <= 0.15
 
 
-def _unsaturated_counts(planes: Planes, sizes: Array, curve: Curve) -> Array:
+def _unsaturated_counts(
+    planes: Planes,
+    sizes: Array,
+    curve: Curve,
+    *,
+    saturated: float = 0.5,  # share of the boxes; .3 has 4 % more error, .7 the same
+) -> Array:
     """Return for each plane how many of the sizes, from the smallest, leave half of the boxes or more empty.
 
     Beyond that any set of islands has boxes of slope 2, which scatter least of all. A set of which one island
@@ -250,7 +249,7 @@ def _unsaturated_counts(planes: Planes, sizes: Array, curve: Curve) -> Array:
     length = sizes.astype(float) if planes.rank == 1 else np.ones(sizes.size)
     share = curve.area / (np.maximum(planes.observed, 1)[:, None] * length)
     largest = np.array([plane.sizes.max(initial=0) for plane in label_planes(planes, 2, keep=False)])
-    count = np.logical_and.accumulate(share < SATURATED, axis=-1).sum(-1)
+    count = np.logical_and.accumulate(share < saturated, axis=-1).sum(-1)
     return np.asarray(np.where(2 * largest > planes.occupied, sizes.size, count))
 
 
@@ -263,6 +262,9 @@ def _fit(
     *,
     by_regression: bool,
     one_for_all: bool,
+    # of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the
+    # intervals hold (width .279), with half of it .985 (.301)
+    between_clusters: float = 0.06,
 ) -> list[WindowFit]:
     """Return the dimension, its interval and its window of sizes for every plane."""
     if by_regression:
@@ -297,7 +299,7 @@ def _fit(
         used = sizes[window]
         slopes = _scaling_fit.ratio_slopes(used, area[window])
         drift = (
-            0.0 if by_regression or window.start == 0 else _scaling_fit.drift_of(slopes) + BETWEEN_CLUSTERS
+            0.0 if by_regression or window.start == 0 else _scaling_fit.drift_of(slopes) + between_clusters
         )
         has_spread = used.size > (2 if by_regression else 3)
         local = slopes[1] if slopes[1].size else np.array([np.nan])
@@ -312,14 +314,21 @@ def _longest_edge(cells: Array) -> int:
     return max((int(places[-1] - places[0]) + 1 if places.size else 0) for places in extents)
 
 
-def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tuple[float, float]:
+def fit_two_covers(
+    sizes: Array,
+    fewest: Array,
+    mean: Array,
+    cover: str,
+    *,
+    limit: float = 0.02,  # with 0 .985 hold (width .286), with .05 all (.365), without one the width is .610
+) -> tuple[float, float]:
     """Return the dimension and the half-width of its interval, from the areas of both covers.
 
     The fewest boxes are exact for sets on a lattice; for curves that lie across it their count rises too fast
     towards small sizes. The mean number errs the other way, and less. Where the mean varies less, both have
     the same weight; elsewhere the fewest boxes are weighted by their variance. Slopes that vary little may
-    still share an error: the difference of the two covers widens the interval, up to a limit, as the mean is
-    far off for sets on a lattice. The limit was set on some thousand sets of known dimension.
+    still share an error: the difference of the two covers widens the interval, up to a `limit`, as the mean
+    is far off for sets on a lattice.
     """
     first, second = _scaling_fit.fit_steady_ratio(sizes, fewest), _scaling_fit.fit_steady_ratio(sizes, mean)
     if not (np.isfinite(first.dimension) and np.isfinite(second.dimension)):
@@ -329,18 +338,25 @@ def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tupl
     difference = abs(first.dimension - second.dimension)
     deviations = _scaling_fit.deviations_of_95_percent(sizes)
     if cover == "minimum":
-        return both, deviations * spread + min(difference, COVER_DIFFERENCE + 0.5 * spread)
+        return both, deviations * spread + min(difference, limit + 0.5 * spread)
     deviation = float(np.hypot(second.spread, second.dimension - both))
-    return second.dimension, deviations * deviation + min(difference, COVER_DIFFERENCE + deviation)
+    return second.dimension, deviations * deviation + min(difference, limit + deviation)
 
 
-def _null(planes: Planes, sizes: Array, windows: list[slice], *, by_regression: bool) -> dict[str, Array]:
+def _null(
+    planes: Planes,
+    sizes: Array,
+    windows: list[slice],
+    *,
+    by_regression: bool,
+    tested: Sequence[int] = (2, 3, 4),
+) -> dict[str, Array]:
     """Return counts, dimension and spread of the random null, and whether the set differs from it.
 
-    The null is fitted in the window of its plane.
+    The null is fitted in the window of its plane, and compared at the sizes `tested`.
     """
     shorter = min(planes.sides)
-    small = np.array([size for size in _random_null.TESTED_SIZES if 2 * size <= shorter], np.int64)
+    small = np.array([size for size in tested if 2 * size <= shorter], np.int64)
     contents = _random_null.box_contents(planes, np.union1d(sizes, small))
     mean = cover_curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
     counts, rows = [], []
@@ -382,10 +398,12 @@ def _null_deviation(
     null: Array,
     fit: Fit,
     rank: int,
+    *,
+    many: int = 64,
 ) -> float:
-    """Return the standard deviation of the null's dimension; of many sizes a few dozen stand for all."""
-    if sizes.size > MANY_SIZES:
-        places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], SOME_SIZES)))
+    """Return the standard deviation of the null's dimension; of `many` sizes and more some stand for all."""
+    if sizes.size > many:
+        places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], 48)))
         sizes, null, boxes = sizes[places], null[places], [boxes[place] for place in places]
         fit = _scaling_fit.fit_regression(sizes, null)
     return _random_null.fit_deviation(cells, observed, sizes**rank, boxes, null, fit.weights)
@@ -404,7 +422,7 @@ def _notes(fits: list[WindowFit], sizes: Array, *, by_regression: bool) -> dict[
         reason = "" if by_regression else "; the mask is too narrow"
         notes["box_dimension"] = {"comment": f"NaN: one size of box gives no slope{reason}"}
         return notes
-    without = [fit for fit in fits if fit.slope_range > NO_POWER_LAW]
+    without = [fit for fit in fits if np.isfinite(fit.slope_low) and not fit.follows_power_law]
     comments = [f"NaN where the set is empty ({empty} planes)"] if empty else []
     if without:
         low, high = min(fit.slope_low for fit in without), max(fit.slope_high for fit in without)

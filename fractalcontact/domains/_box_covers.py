@@ -15,8 +15,6 @@ import numpy as np
 from fractalcontact.base.jit import kernel
 from fractalcontact.domains._masks import Array, Planes, parallel_map
 
-FOLD = 1 << 13  # positions of boxes that are kept apart: with fewer, loops are too short to be fast
-ADDED = 1 << 22  # sums that are added up at a time: all those of a large plane take gigabytes
 COVERS = ("minimum", "mean", "aligned")
 ROW = np.array(
     [[0, 1, 0, 1, 0]]
@@ -74,7 +72,14 @@ def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
 
 
 def _fewest_boxes(
-    cells: Array, size: int, row_bands: Array, column_bands: Array, *, wrap_x: bool
+    cells: Array,
+    size: int,
+    row_bands: Array,
+    column_bands: Array,
+    *,
+    wrap_x: bool,
+    folded: int = 1 << 13,  # positions of boxes that are kept apart: with fewer, loops are too short
+    added: int = 1 << 22,  # sums that are added up at a time: all those of a large plane take gigabytes
 ) -> tuple[int, int]:
     """Return the fewest boxes that meet the set, and their least area in cells, over all offsets of the grid.
 
@@ -89,7 +94,7 @@ def _fewest_boxes(
     columns = np.zeros((3, nx), np.int32)
     prefix = np.zeros((2, nx + 1 + (2 * size if wrap_x else 0)), np.int32)
     positions = int(is_full.sum())
-    fold = size * max(1, -(-min(positions, FOLD) // size))  # of a whole number of boxes
+    fold = size * max(1, -(-min(positions, folded) // size))  # of a whole number of boxes
     met, lost = np.zeros((2, offsets, fold), np.int32)
     count_boxes_in_bands(
         cells,
@@ -106,7 +111,7 @@ def _fewest_boxes(
         area,
     )
     fewest, least = [], []
-    step = max(1, ADDED // fold)
+    step = max(1, added // fold)
     for start in range(0, offsets, step):
         rows = slice(start, start + step)
         full, cut = (v[rows].reshape(-1, fold // size, size).sum(1, dtype=np.int64) for v in (met, lost))

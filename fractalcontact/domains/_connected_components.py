@@ -18,7 +18,6 @@ from fractalcontact.base.jit import kernel
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains._masks import Array, Planes, check_mask
 
-STRUCTURES = {1: ndimage.generate_binary_structure(2, 1), 2: ndimage.generate_binary_structure(2, 2)}
 BAND_CELLS = 2**22  # cells that are labelled at a time where no map is kept: 16 MB of labels
 MANY_ISLANDS = 2**22  # of a plane, above which only their cells are measured by default
 INT64_MAX = np.iinfo(np.int64).max
@@ -142,13 +141,14 @@ def label_plane(
     ny, nx = cells.shape
     height = ny if keep else max(1, BAND_CELLS // nx)
     steps = (0,) if connectivity == 1 else (-1, 0, 1)
+    neighbours = ndimage.generate_binary_structure(2, connectivity)
     count_dtype = np.int32 if cells.size < 2**31 else np.int64
     measures = detailed is not False
     count, links, counts, columns = 0, [], [], []
     rows: list[Array] = []
     details: list[tuple[Array, ...]] = []
     for start in range(0, ny, height):
-        parts, number = ndimage.label(cells[start : start + height], STRUCTURES[connectivity])
+        parts, number = ndimage.label(cells[start : start + height], neighbours)
         counts.append(_part_sizes(parts, number).astype(count_dtype))
         measures &= detailed is not None or count + number <= MANY_ISLANDS
         if measures:

@@ -27,7 +27,6 @@ EVENTS = ("births", "deaths", "merges", "splits", "absorbed", "fragments")
 CHANGES = (*EVENTS, "overlap", "chance_overlap", "overlap_beyond_chance", "hausdorff_distance")
 RETURN_NAMES = ("return_step", "hysteresis", "coverage_change")
 OF_SIGNATURE = ("mask", "window", "along", "connectivity", "periodic", "valid")  # its arguments
-SAME_LOAD = 1e-6  # of the largest load: rounding of a path that comes back
 
 
 def _check(problems: Problems) -> None:
@@ -203,7 +202,7 @@ def same_load_steps(loads: Array) -> Array:
     """
     steps = np.full(loads.size, -1, np.int64)
     branch = np.sign(np.diff(loads))  # from each step to the next: loading or unloading
-    limit = SAME_LOAD * np.nanmax(np.abs(loads), initial=0.0)
+    limit = 1e-6 * np.nanmax(np.abs(loads), initial=0.0)  # rounding of a path that comes back
     for step in range(2, loads.size):
         # a turning point belongs to both branches
         opposite = branch[:step] == -branch[step - 1]

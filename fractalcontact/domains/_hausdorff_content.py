@@ -27,8 +27,6 @@ SOURCE = (
     "lemma); Carpinteri, Mech. Mater. 18:89 (1994) (renormalised measure)"
 )
 SQUARE = 1e-6  # largest difference of the two spacings of square cells, relative
-# shifts of the grid follow the powers of the plastic number, which fill a square evenly (Roberts 2018)
-EVEN_STEPS = 1.32471795724474602596 ** -np.array([1.0, 2.0])
 
 
 def _check(problems: Problems) -> None:
@@ -136,7 +134,9 @@ def cover_levels(planes: Planes, coarsest: float | None) -> int:
 
 def shifted_contents(planes: Planes, exponents: Array, levels: int, shifts: int) -> Array:
     """Return the contents in cells^s for each shift of the grid of squares, (planes, shifts, exponents)."""
-    offsets = np.floor(2**levels * (np.arange(shifts)[:, None] * EVEN_STEPS % 1.0)).astype(np.int64)
+    # powers of the plastic number, the root of x^3 = x + 1, fill a square evenly (Roberts 2018)
+    steps = 1.32471795724474602596 ** -np.array([1.0, 2.0])
+    offsets = np.floor(2**levels * (np.arange(shifts)[:, None] * steps % 1.0)).astype(np.int64)
     periodic = planes.grid.periodic
     contents = planes.map(
         lambda cells, _: [_contents(cells, exponents, levels, offset, periodic) for offset in offsets],

@@ -25,7 +25,6 @@ SOURCE = (
     "Allain and Cloitre, Phys. Rev. A 44:3552 (1991); Plotnick et al., Phys. Rev. E 53:5461 (1996) "
     "(gliding box); Lantuejoul, J. Microsc. 161:387 (1991) (integral range)"
 )
-MANY_SIZES = 24  # above so many sizes one transform is cheaper than a sum for each
 BLOCKS = 4  # along each axis: 16 give 15 degrees of freedom, and each is still wider than a box of L/8
 LARGEST_INT32, LARGEST_INT64 = (np.iinfo(dtype).max for dtype in (np.int32, np.int64))
 BOXES = ("gliding", "fixed", "along_x", "along_y")
@@ -142,12 +141,19 @@ def analyse(
     return planes.dataset(variables, planes.box_coords(sizes), notes=_notes(planes, values, boxes))
 
 
-def _with_interval(planes: Planes, cells: Array, sizes: Array, boxes: str) -> tuple[Array, Array, Array]:
+def _with_interval(
+    planes: Planes,
+    cells: Array,
+    sizes: Array,
+    boxes: str,
+    *,
+    many: int = 24,  # above so many sizes one transform is cheaper than a sum for each
+) -> tuple[Array, Array, Array]:
     """Return <M^2> / <M>^2 and the ends of its interval, each (planes, sizes); NaN where undefined."""
     all_positions = planes.valid is None and all(planes.grid.periodic) and cells.dtype == np.uint8
     if boxes == "fixed":
         values = _fixed_lacunarity(planes, cells, sizes)
-    elif boxes == "gliding" and all_positions and sizes.size > MANY_SIZES:
+    elif boxes == "gliding" and all_positions and sizes.size > many:
         values = np.array([_lacunarity_from_pairs(plane, sizes) for plane in cells])
     else:
         shapes = np.stack([sizes if boxes != "along_x" else 0 * sizes + 1, sizes], axis=-1)
@@ -385,7 +391,7 @@ def glide(
     `seen_prefix` alike for observed cells, int32.
     """
     ny = cells.shape[0]
-    blocks = 4
+    blocks = BLOCKS
     has_gaps = valid.size > 0
     area = height * width
     for i in range(1 - height, rows):

@@ -30,7 +30,6 @@ R = TypeVar("R")
 
 # dims that results add
 RESULT_DIMS = ("axis", "box_size", "island", "link", "moment_order", "radius", "scale", "side")
-CELLS_PER_THREAD = 1 << 18  # a pass over so many takes as long as to start a pool of threads
 EXPECTED = "a boolean DataArray or integer flags (contact where value > 0) with dims (..., y, x)"
 EXPECTED_MEASURE = f"{EXPECTED}; or finite numbers, none negative"
 PROFILE_DIMS = ("x",)
@@ -345,17 +344,23 @@ def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
     return coords
 
 
-def parallel_map(function: Callable[[S], R], items: Iterable[S], cells: int) -> list[R]:
+def parallel_map(
+    function: Callable[[S], R],
+    items: Iterable[S],
+    cells: int,
+    *,
+    cells_per_thread: int = 1 << 18,  # a pass over so many takes as long as to start a pool of threads
+) -> list[R]:
     """Apply a function that releases the interpreter lock to all items, in order.
 
     Each item takes a pass over so many cells. On several threads where that is worth their start, some items
     at a time: to hand over one takes as long as a pass over a thousand cells.
     """
     items = list(items)
-    threads = min(thread_count(), len(items), len(items) * cells // CELLS_PER_THREAD)
+    threads = min(thread_count(), len(items), len(items) * cells // cells_per_thread)
     if threads < 2:
         return [function(item) for item in items]
-    size = max(1, min(len(items) // (4 * threads), CELLS_PER_THREAD // max(1, cells)))
+    size = max(1, min(len(items) // (4 * threads), cells_per_thread // max(1, cells)))
     chunks = [items[start : start + size] for start in range(0, len(items), size)]
     with ThreadPoolExecutor(threads) as pool:
         results = pool.map(lambda chunk: [function(item) for item in chunk], chunks)

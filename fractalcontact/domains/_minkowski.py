@@ -20,7 +20,6 @@ from fractalcontact.domains._random_null import miss_probability
 from fractalcontact.domains._scaling_fit import default_sizes, dimension_variables, fit_notes, fit_power_law
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (Minkowski content); Felzenszwalb and Huttenlocher (2012)"
-SHORT_REACH = 2**14  # cells; distances up to it are kept as int16
 
 
 def _check(problems: Problems) -> None:
@@ -130,7 +129,8 @@ def _count_offsets(
     `reach` (rows, columns) is the longest offset, `steps` are the spacings. A cell without an observed mirror
     image about a nearest cell of the set counts twice.
     """
-    above, below = np.empty((2, *cells.shape), np.int16 if max(reach) < SHORT_REACH else np.int32)
+    is_short = max(reach) < np.iinfo(np.int16).max
+    above, below = np.empty((2, *cells.shape), np.int16 if is_short else np.int32)
     rows_to_set(cells, reach[0], periodic[0], above, below)
     observed = np.broadcast_to(np.uint8(1), cells.shape) if valid is None else valid
     high, wide = ((np.arange(n + 1) * step) ** 2 for n, step in zip(reach, steps, strict=True))

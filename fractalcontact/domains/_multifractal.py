@@ -13,8 +13,6 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks, _scaling_fit
 from fractalcontact.domains._masks import Array
 
-ORDERS = (0.0, 1.0, 2.0, 3.0, 4.0)  # support, entropy, pairs, and two that the largest boxes rule
-LARGEST_ORDER = 1e4  # of a moment: beyond it only the largest box counts
 SOURCE = (
     "Hentschel and Procaccia, Physica D 8:435 (1983); Halsey et al., Phys. Rev. A 33:1141 (1986); "
     "Chhabra and Jensen, Phys. Rev. Lett. 62:1327 (1989)"
@@ -22,13 +20,17 @@ SOURCE = (
 
 
 def _check(problems: Problems) -> None:
-    problems.numbers("q", at_least=-LARGEST_ORDER, at_most=LARGEST_ORDER)
+    problems.numbers("q", at_least=-1e4, at_most=1e4)  # beyond it only the largest box counts
     _masks.check_box_sizes(problems, max(_masks.plane_shape(_masks.check_measure(problems))))
 
 
 @public_result(title="Generalised dimensions", references=SOURCE, check=_check)
 def generalised_dimensions(
-    mask: xr.DataArray, q: Any = ORDERS, *, box_sizes: Any = None, valid: xr.DataArray | None = None
+    mask: xr.DataArray,
+    q: Any = (0.0, 1.0, 2.0, 3.0, 4.0),  # support, entropy, pairs, and two that the largest boxes rule
+    *,
+    box_sizes: Any = None,
+    valid: xr.DataArray | None = None,
 ) -> xr.Dataset:
     """Generalised (Renyi) dimensions D_q of a set, or of a measure such as the contact pressure.
 

@@ -17,13 +17,6 @@ from scipy.special import gammaln
 
 from fractalcontact.domains._masks import Array, Planes
 
-TESTED_SIZES = (2, 3, 4)  # box sizes in cells at which a set is compared with the null
-DEVIATIONS = 3.3  # about one null in a thousand lies further out at a given size
-# up to which a product of factors is exact to 1e-15, where the series is off by 8e-12 (10^6 cells)
-FEW_CELLS = 64
-# cells from which Stirling's series serves: its next term, 1 / (360 n^3), is below 3e-12
-STIRLING_FROM = 1000
-
 
 @dataclass(frozen=True)
 class BoxContents:
@@ -38,17 +31,24 @@ class BoxContents:
     boxes: float
 
 
-def miss_probability(cells: float, observed: float, region: Array) -> Array:
+def miss_probability(
+    cells: float,
+    observed: float,
+    region: Array,
+    *,
+    few: int = 64,  # a product of factors is exact to 1e-15; the series is off by 8e-12 (10^6 cells)
+    many: int = 1000,  # Stirling's series serves: its next term, 1 / (360 n^3), is below 3e-12
+) -> Array:
     """Probability that none of `cells` cells out of `observed` lies in a region of so many cells."""
     region = np.asarray(region, float)
     left = observed - cells - region
     inside = np.where(left > 0.0, region, 0.0)
-    if cells <= FEW_CELLS:
+    if cells <= few:
         order = np.arange(int(cells))
         log = np.sum(np.log1p(-inside[..., None] / (observed - order)), axis=-1)
-    elif observed - cells > STIRLING_FROM:
+    elif observed - cells > many:
         log = inside * np.log1p(-cells / observed) - _tail(observed - cells, inside) + _tail(observed, inside)
-        log = np.where(left > STIRLING_FROM, log, _log_ratio(cells, observed, inside))
+        log = np.where(left > many, log, _log_ratio(cells, observed, inside))
     else:
         log = _log_ratio(cells, observed, inside)
     return np.where(
@@ -136,18 +136,24 @@ def fit_deviation(
 
 
 def differs_from_null(
-    cells: float, observed: float, areas: Array, mean_counts: Array, contents: Sequence[BoxContents]
+    cells: float,
+    observed: float,
+    areas: Array,
+    mean_counts: Array,
+    contents: Sequence[BoxContents],
+    *,
+    deviations: float = 3.3,  # about one null in a thousand lies further out at a given size
 ) -> bool:
-    """Return whether the mean counts at the `TESTED_SIZES` lie outside the range of the null.
+    """Return whether the mean counts of boxes of a few cells lie outside the range of the null.
 
-    A departure must exceed 3.3 standard deviations and one box: where hardly two cells of the null are
+    A departure must exceed so many standard deviations and one box: where hardly two cells of the null are
     neighbours, one pair of neighbours is not significant.
     """
     if areas.size == 0:
         return False
     null = expected_counts(cells, observed, areas, contents)
     deviation = np.sqrt(np.maximum(np.diag(count_covariance(cells, observed, areas, contents)), 0.0))
-    return bool(np.any(np.abs(mean_counts - null) > DEVIATIONS * deviation + 1.0))
+    return bool(np.any(np.abs(mean_counts - null) > deviations * deviation + 1.0))
 
 
 def box_contents(planes: Planes, sizes: Array) -> list[dict[int, BoxContents]]:

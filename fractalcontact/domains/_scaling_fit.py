@@ -15,19 +15,6 @@ from fractalcontact.domains._masks import Array, Planes
 # the Minkowski and all of the correlation dimension hold; with 2 .815 and .985, with 3 .969 and all
 DEVIATIONS = 2.5
 ROUNDING = 1e-14  # smallest half-width of an interval
-# of the sizes whose local slopes are averaged: those of the default sizes. With 2 alone the error of 194
-# sets of known dimension is .125 in place of .089, with 4 and 5 too .041 (sets built by these), but .974 of
-# their intervals hold in place of all
-RATIOS = (2, 3)
-TINY = 1e-24  # variance of slopes that differ by rounding alone
-# of the sizes in a window, and how many it holds: on the same sets a ratio of 4 has an error of .075 and
-# widths of .53 in place of .33, of 16 .105; 4 sizes change nothing, 9 have wider intervals (.35)
-LEAST_RATIO, LEAST_SIZES = 8, 6
-# spread of slopes below which a longer window is better than a steadier one; .001 to .01 are alike
-STEADY = 3e-3
-# of the unsteadiness of the usual window, from which on another one replaces it: never, the error is .113
-# (width .63); from .3 on .093 (.33), .7 .087 (.37), 1 .082 (.41)
-STEADIER = 0.5
 
 
 def default_sizes(shape: Sequence[int]) -> Array:
@@ -98,8 +85,15 @@ def fit_regression(sizes: Array, measure: Array) -> Fit:
     return Fit(0.0 - float(slope), float(spread), -weights)
 
 
-def _slopes_by_ratio(sizes: Array, area: Array) -> list[tuple[int, Array, Array, Array]]:
-    """Return the ratio, the places of both sizes and the local dimensions between them, for each of `RATIOS`.
+def _slopes_by_ratio(
+    sizes: Array,
+    area: Array,
+    *,
+    # those of the default sizes. With 2 alone the error of 194 sets of known dimension is .125 in place of
+    # .089, with 4 and 5 too .041 (sets built by these), but .974 of their intervals hold in place of all
+    ratios: Sequence[int] = (2, 3),
+) -> list[tuple[int, Array, Array, Array]]:
+    """Return the ratio, the places of both sizes and the local dimensions between them, for each ratio.
 
     Ratios that no two sizes have are left out, and all of them where an area is not positive.
     """
@@ -107,7 +101,7 @@ def _slopes_by_ratio(sizes: Array, area: Array) -> list[tuple[int, Array, Array,
         return []
     index_of = {int(size): index for index, size in enumerate(sizes)}
     result = []
-    for ratio in RATIOS:
+    for ratio in ratios:
         pairs = [(i, index_of[ratio * size]) for size, i in index_of.items() if ratio * size in index_of]
         if pairs:
             low, high = np.array(pairs).T
@@ -138,10 +132,15 @@ def fit_steady_ratio(sizes: Array, area: Array) -> Fit:
     return Fit(dimension, spread, share @ np.array(weights))
 
 
-def weighted_mean(slopes: Sequence[float], variances: Sequence[float]) -> tuple[float, float, Array]:
+def weighted_mean(
+    slopes: Sequence[float],
+    variances: Sequence[float],
+    *,
+    tiny: float = 1e-24,  # variance of slopes that differ by rounding alone
+) -> tuple[float, float, Array]:
     """Average estimates by the inverse square of their variances; return mean, spread and shares."""
     slope, variance = np.array(slopes), np.array(variances)
-    relative = (variance + TINY) / (variance + TINY).min()
+    relative = (variance + tiny) / (variance + tiny).min()
     share = relative**-2.0
     share = share / share.sum()
     mean = float(slope[0] + share @ (slope - slope[0]))
@@ -171,31 +170,45 @@ def drift_of(slopes: tuple[Array, Array]) -> float:
     return float(abs(centred @ (y - y.mean())) / (centred @ centred) * np.ptp(x))
 
 
-def steadiest_window(sizes: Array, areas: Array, longest: float, shape: Sequence[int], limit: int) -> slice:
+def steadiest_window(
+    sizes: Array,
+    areas: Array,
+    longest: float,
+    shape: Sequence[int],
+    limit: int,
+    *,
+    # on 194 sets of known dimension a ratio of 4 has an error of .075 and widths of .53 in place of .33, of
+    # 16 .105; 4 sizes change nothing, 9 have wider intervals (.35)
+    least_ratio: int = 8,
+    least_sizes: int = 6,
+    # of the unsteadiness of the usual window: if never, the error is .113 (width .63); from .3 on .093 (.33),
+    # .7 .087 (.37), 1 .082 (.41)
+    steadier: float = 0.5,
+) -> slice:
     """Return the window of sizes of the fit of all planes: the usual one, or a steadier one of longer boxes.
 
-    `areas` is (planes, sizes). No window holds more than the first `limit` sizes, or `LEAST_SIZES` if those
+    `areas` is (planes, sizes). No window holds more than the first `limit` sizes, or `least_sizes` if those
     are more: further boxes are saturated, and their slopes, all 2, would be the steadiest of all.
 
     The usual window reaches from one cell to the geometric mean of the cell and the extent. The counts of a
-    cluster that grew on the lattice rise too slowly at boxes of a few cells. Windows that hold sizes of a
-    ratio of at least 8, up to a quarter of the set (`longest`), are compared by the spread of their local
-    slopes over their length in ln s, averaged over the planes. The best replaces the usual one if it is
-    steadier by far and its dimension is higher: slopes that fall from 2 with the size are those of islands,
-    which are resolved.
+    cluster that grew on the lattice rise too slowly at boxes of a few cells. Windows of at least
+    `least_sizes` that span a ratio of at least `least_ratio`, up to a quarter of the set (`longest`), are
+    compared by the spread of their local slopes over their length in ln s, averaged over the planes. The best
+    replaces the usual one if it is steadier by far and its dimension is higher: slopes that fall from 2 with
+    the size are those of islands, which are resolved.
     """
     usual = default_sizes(shape).max()
-    most = max(limit, LEAST_SIZES)
+    most = max(limit, least_sizes)
     count = min(most, int(np.searchsorted(sizes, max(longest, usual), side="right")))
     chosen = slice(0, min(most, int(np.searchsorted(sizes, usual, side="right"))))
     dimension, unsteadiness = _mean_fit(sizes[chosen], areas[:, chosen])
     if not np.isfinite(dimension):
         return chosen
-    lowest = STEADIER * unsteadiness
+    lowest = steadier * unsteadiness
     for stop in range(chosen.stop, count + 1):
-        for start in range(1, stop - LEAST_SIZES + 1):
+        for start in range(1, stop - least_sizes + 1):
             part = slice(start, stop)
-            if sizes[stop - 1] < LEAST_RATIO * sizes[start]:
+            if sizes[stop - 1] < least_ratio * sizes[start]:
                 break
             higher, score = _mean_fit(sizes[part], areas[:, part])
             if score < lowest and higher > dimension:
@@ -203,11 +216,16 @@ def steadiest_window(sizes: Array, areas: Array, longest: float, shape: Sequence
     return chosen
 
 
-def _mean_fit(sizes: Array, areas: Array) -> tuple[float, float]:
+def _mean_fit(
+    sizes: Array,
+    areas: Array,
+    *,
+    steady: float = 3e-3,  # below it a longer window is better than a steadier one; .001 to .01 are alike
+) -> tuple[float, float]:
     """Return the mean dimension of all planes, and the spread of local slopes over the length in ln s."""
     fits = [fit_steady_ratio(sizes, area) for area in areas]
     length = np.log(sizes[-1] / sizes[0]) if sizes.size > 1 else np.inf
-    spread = np.mean([np.hypot(fit.spread, STEADY) for fit in fits])
+    spread = np.mean([np.hypot(fit.spread, steady) for fit in fits])
     return float(np.mean([fit.dimension for fit in fits])), float(spread / length)
 
 

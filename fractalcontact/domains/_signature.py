@@ -31,14 +31,8 @@ SOURCE = (
     "17:1217 (1989) (block jackknife)"
 )
 FLAGS = ("measured", "empty", "full", "no_window", "filled", "too_few", "unresolved")  # also in the schema
-CURVE_SIZES = 24  # from a cell to half the extent; with 300, 15 gaps at 256 cells moved by .4 % at most
-WINDOW_SIZES = 9  # in a window of ratio 4 at a ratio of 1.19, so that local slopes still differ
 FINEST = 4  # cells: squares below see the grid (d = 2 up to a cell, whatever the set is)
-LEAST_RATIO = 4.0  # of a window; between five surfaces D scattered by .041 at a ratio of 2, .031 at 4
-LARGEST_SHARE = 8  # of the extent: beyond L/8 the block jackknife covers half of the true spread
-LAST_SHARE = 4  # of the extent that a window of the least ratio may use where spots are large
 FEWEST_ISLANDS = 30  # below which the realisation, not the domain, sets the slope
-FEWEST_CELLS = 10  # of the median island: below, clustering grows with the grid (2.6 to 9.4, 256 to 2048)
 HALF = np.log(-np.log(0.5))  # P = 1/2 on the scale of ln(-ln(1 - P)), on which P(s) of random spots is smooth
 # the four smallest boxes (height, width): their P give coverage, widths of the spots, and their number
 SMALLEST = np.array([(1, 1), (1, 2), (2, 1), (2, 2)])
@@ -196,17 +190,28 @@ def analyse(
     return planes.dataset(variables, coords, notes=_notes(low, high))
 
 
-def common_window(spots: Array, gaps: Array, shortest: float, extent: float) -> tuple[float, float]:
+def common_window(
+    spots: Array,
+    gaps: Array,
+    shortest: float,
+    extent: float,
+    *,
+    least_ratio: float = 4.0,  # between five surfaces D scattered by .041 at a ratio of 2, .031 at 4
+    usual_share: int = 8,  # beyond L/8 the block jackknife covers half of the true spread
+    last_share: int = 4,
+) -> tuple[float, float]:
     """Return the window (m) of states with these spots and gaps; where it does not fit, (nan, nan).
 
-    A state with a gap below twice its own start is filled whatever the window is, and has no say in it.
+    It ends at the `usual_share` of the extent, but where spots are large one of the `least_ratio` may reach
+    up to the `last_share`. A state with a gap below twice its own start is filled whatever the window is, and
+    has no say in it.
     """
     own_start = np.maximum(FINEST * shortest, spots)
     open_states = ~(gaps < 2.0 * own_start)  # a gap is NaN beyond half the extent
     low = max(FINEST * shortest, np.max(spots[open_states], initial=0.0))
     smallest_gap = np.nanmin(gaps[open_states], initial=np.inf)
-    high = max(LEAST_RATIO * low, min(extent / LARGEST_SHARE, smallest_gap))
-    return (low, high) if high <= extent / LAST_SHARE * (1 + 1e-9) else (np.nan, np.nan)
+    high = max(least_ratio * low, min(extent / usual_share, smallest_gap))
+    return (low, high) if high <= extent / last_share * (1 + 1e-9) else (np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -267,11 +272,18 @@ class WindowQuantities:
     plain: dict[str, Array]
 
 
-def _window_quantities(planes: Planes, spots: RandomSpots, window: Array, scales: Array) -> WindowQuantities:
+def _window_quantities(
+    planes: Planes,
+    spots: RandomSpots,
+    window: Array,
+    scales: Array,
+    *,
+    sizes: int = 9,  # in a window of ratio 4 at a ratio of 1.19, so that local slopes still differ
+) -> WindowQuantities:
     """Return dimension, excess, clustering and lacunarity over the window and at its three scales."""
     grid = planes.grid
     low, high = window if np.isfinite(window).all() else scales[[0, -1]]
-    fitted = np.geomspace(low, high, WINDOW_SIZES)
+    fitted = np.geomspace(low, high, sizes)
     hits, masses = Bracket.of(np.append(fitted, scales), grid, 1), Bracket.of(scales, grid, 0)
     squares = masses.boxes
     rows, columns = squares.copy(), squares.copy()
@@ -287,12 +299,12 @@ def _window_quantities(planes: Planes, spots: RandomSpots, window: Array, scales
             for part in np.split(moments.lacunarity - 1.0, ends, axis=-1)[1:]
         ]
         null = spots.hit(np.append(fitted, scales)[:, None] / np.array(grid.spacing))
-        dimension, of_null = (_dimension(fitted, each[..., :WINDOW_SIZES]) for each in (hit, null))
-        local = 2.0 - np.diff(np.log(hit[:, 0, :WINDOW_SIZES]), axis=-1) / np.diff(np.log(fitted))
+        dimension, of_null = (_dimension(fitted, each[..., :sizes]) for each in (hit, null))
+        local = 2.0 - np.diff(np.log(hit[:, 0, :sizes]), axis=-1) / np.diff(np.log(fitted))
         replicates = {
             "domain_dimension": dimension,
             "excess_dimension": dimension - of_null,
-            "clustering": (null / hit)[..., WINDOW_SIZES:],
+            "clustering": (null / hit)[..., sizes:],
             "integral_range": excess[0] * spots.coverage[..., None] * scales**2,
             "lacunarity_ratio": excess[1] / excess[2],
         }
@@ -337,9 +349,15 @@ class Bracket:
         return np.asarray(np.where(self.weight > 0, below + self.weight * (above - below), below))
 
 
-def _curve_steps(shortest: float, extent: float, grid: Grid) -> Array:
+def _curve_steps(
+    shortest: float,
+    extent: float,
+    grid: Grid,
+    *,
+    sizes: int = 24,  # with 300, 15 gaps at 256 cells moved by .4 % at most
+) -> Array:
     """Return the squares of the curves, from a cell to half the extent, in cells along y and x."""
-    sides = np.geomspace(shortest, max(extent / 2.0, shortest), CURVE_SIZES)
+    sides = np.geomspace(shortest, max(extent / 2.0, shortest), sizes)
     cells = np.rint(sides[:, None] / np.array(grid.spacing)).astype(np.int64)
     return np.unique(np.clip(cells, 1, np.maximum(np.array(grid.shape) - 1, 1)), axis=0)
 
@@ -382,7 +400,14 @@ def _gap(lengths: Array, hit: Array) -> Array:
 
 
 def _flags(
-    planes: Planes, gap: Array, islands: Array, median: Array, start: Array, *, has_window: bool
+    planes: Planes,
+    gap: Array,
+    islands: Array,
+    median: Array,
+    start: Array,
+    *,
+    has_window: bool,
+    fewest_cells: int = 10,  # below, clustering grows with the grid (2.6 to 9.4, 256 to 2048)
 ) -> tuple[Array, Array]:
     """Return the flag of each state, out of `FLAGS`, and the reason in words."""
     coverage, count = planes.coverage, planes.count
@@ -399,8 +424,8 @@ def _flags(
         ),
         (islands < FEWEST_ISLANDS, [f"{number} islands, fewer than {FEWEST_ISLANDS}" for number in islands]),
         (
-            median < FEWEST_CELLS,
-            [f"the median island has {cells:g} cells, fewer than {FEWEST_CELLS}" for cells in median],
+            median < fewest_cells,
+            [f"the median island has {cells:g} cells, fewer than {fewest_cells}" for cells in median],
         ),
     ]
     flags = [next((flag for flag, (fails, _) in enumerate(tests, 1) if fails[k]), 0) for k in range(count)]
