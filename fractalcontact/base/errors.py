@@ -1,5 +1,7 @@
 """Exceptions and warnings of the package, one class for each cause."""
 
+import inspect
+import warnings
 from collections.abc import Sequence
 
 
@@ -80,6 +82,14 @@ class AnisotropyWarning(FractalContactWarning):
 
 class LoadedWarning(FractalContactWarning):
     """A dask array is loaded into memory by a function that needs all of it."""
+
+
+def warn(message: str, category: type[FractalContactWarning]) -> None:
+    """Warn at the line of the caller's own code, the nearest one outside this package."""
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_globals.get("__name__", "").startswith("fractalcontact."):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def _count(number: int) -> str:

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import inspect
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
@@ -28,7 +27,7 @@ from typing import Any, ParamSpec, Protocol, TypeVar, cast
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, LoadedWarning, TooLittleMemory
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, LoadedWarning, TooLittleMemory, warn
 from fractalcontact.base.memory import (
     NEGLIGIBLE,
     Estimate,
@@ -198,7 +197,7 @@ def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray) -> None:
         place = f"{', '.join(places)}: " if places else ""
         shown.append(place + " ".join(filter(None, [reason, work, error])))
     more = f"; and {len(failed) - PLACES_SHOWN} more" if len(failed) > PLACES_SHOWN else ""
-    warnings.warn(f"{name}: not converged: {'; '.join(shown)}{more}", ConvergenceWarning, stacklevel=3)
+    warn(f"{name}: not converged: {'; '.join(shown)}{more}", ConvergenceWarning)
 
 
 def announce_loading(name: str, arguments: Mapping[str, Any]) -> None:
@@ -209,7 +208,7 @@ def announce_loading(name: str, arguments: Mapping[str, Any]) -> None:
         message = (
             f"{name}: the dask arrays of `{argument}` are loaded into memory, {value.nbytes / 1e6:.3g} MB"
         )
-        warnings.warn(message, LoadedWarning, stacklevel=4)
+        warn(message, LoadedWarning)
 
 
 def _size_of(arguments: Mapping[str, Any]) -> str:

@@ -7,13 +7,12 @@ said in the `history` of the result.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput, ScaleWarning
+from fractalcontact.base.errors import InvalidInput, ScaleWarning, warn
 from fractalcontact.base.grid import METRES, plane_coords
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.validation import Problems, float_array
@@ -84,7 +83,7 @@ def _warn_of_unit(where: str, value: xr.DataArray, core: tuple[str, ...]) -> Non
                 f"it is in millimetres, set surface.{dim}.attrs['units'] = 'mm' (also of the heights), else "
                 "'m'"
             )
-            warnings.warn(message, ScaleWarning, stacklevel=6)
+            warn(message, ScaleWarning)
             return
 
 

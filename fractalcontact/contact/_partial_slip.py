@@ -164,9 +164,7 @@ def partial_slip(
     stiffness = result["tangential_stiffness"]
     result["tangential_stiffness"] = stiffness.where(np.isfinite(stiffness))
     if sheared.method == "superposition":
-        warn_lay(
-            "fractalcontact.contact.partial_slip: the contact", sheared.superposition_error, stacklevel=4
-        )
+        warn_lay("fractalcontact.contact.partial_slip: the contact", sheared.superposition_error)
     residual = float(np.fmax.reduce(result["residual"].values))
     stated = {"method": sheared.method, **options.stated_on(grid)}
     return result.assign_attrs(stated, achieved_residual=residual)

@@ -162,7 +162,7 @@ def press(
     slopes = [rms_slope(plane, grid) for plane in stack]
     result = _dataset(surface, grid, float(contact_modulus), load, planes, slopes)
     _add_reasons(result)
-    warn_steep("fractalcontact.contact.press: the surface", max(slopes), stacklevel=4)
+    warn_steep("fractalcontact.contact.press: the surface", max(slopes))
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     residual = float(np.fmax.reduce(result.variables["residual"].values, axis=None))

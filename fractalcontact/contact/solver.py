@@ -13,7 +13,6 @@ every step states whether it converged.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -21,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning
+from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning, warn
 from fractalcontact.base.grid import EXCESS_PER_EDGE, Grid, contact_edges
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.progress import track
@@ -139,22 +138,22 @@ def rms_slope(heights: Array, grid: Grid) -> float:
     return float(np.sqrt(square))
 
 
-def warn_steep(what: str, slope: float, *, stacklevel: int) -> None:
+def warn_steep(what: str, slope: float) -> None:
     """Warn of a surface beyond small strains, by its rms slope."""
     if slope > STEEP:
         limits = f"beyond {STEEP:g} strains are not small, and linear elasticity is an approximation"
         message = f"{what} has an rms slope of up to {slope:.2g}; {limits}"
-        warnings.warn(message, SmallStrainWarning, stacklevel=stacklevel)
+        warn(message, SmallStrainWarning)
 
 
-def warn_lay(what: str, error: float, *, stacklevel: int) -> None:
+def warn_lay(what: str, error: float) -> None:
     """Warn of a contact with a lay that was solved by superposition, by the error of that."""
     if abs(error) > ACCEPTABLE_ERROR:
         message = (
             f"{what} has a lay, and by superposition displacement and dissipated energy are off by about"
         )
         message += f" {error:+.0%}: use method='full'"
-        warnings.warn(message, AnisotropyWarning, stacklevel=stacklevel)
+        warn(message, AnisotropyWarning)
 
 
 def _state(step: Step) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -12,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import PREFERRED_LAW
@@ -138,7 +137,7 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     rounding = 1e-14 * float(np.fmax.reduce(np.abs(bulk), axis=None))
     if "converged" in closure and not closure["converged"].values.all():
         message = "fractalcontact.joints.closure_laws: steps that did not converge are fitted like the others"
-        warnings.warn(message, ConvergenceWarning, stacklevel=4)
+        warn(message, ConvergenceWarning)
     fits, flags, stiffnesses, seated = [], [], [], []
     for w, p in zip(interface.values.reshape(-1, steps), pressure.values.reshape(-1, steps), strict=True):
         counted = w if seat is None else w - closure_at(seat, p, w)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import Direction, check_direction, read_direction
-from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.progress import track
 from fractalcontact.base.references import joined_references
@@ -201,11 +200,11 @@ def _warn(joints: Sequence[WornJoint]) -> None:
     from fractalcontact.contact.solver import warn_steep
 
     steepest = max(joint.steepest for joint in joints)
-    warn_steep(f"{WHERE}: the delta-surface", steepest, stacklevel=5)
+    warn_steep(f"{WHERE}: the delta-surface", steepest)
     failed = sum(joint.unconverged for joint in joints)
     if failed:
         message = f"{WHERE}: the solver did not converge {failed} times; see the achieved residual"
-        warnings.warn(message, ConvergenceWarning, stacklevel=4)
+        warn(message, ConvergenceWarning)
 
 
 def _turning_points(path: Any) -> Array:

@@ -168,7 +168,7 @@ def partial_slip(
     errors = result["superposition_error"].where(by_superposition, 0.0).values
     worst = int(np.argmax(np.abs(errors)))
     what = f"{WHERE}: the contact at a shear of {shears[worst]:g} m"
-    contact_solver.warn_lay(what, float(errors[worst]), stacklevel=4)
+    contact_solver.warn_lay(what, float(errors[worst]))
     return result.assign_attrs(achieved_residual=float(result["residual"].max()))
 
 

@@ -9,14 +9,13 @@ smoothed faces refine it. Places where the faces are damaged get little weight.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, warn
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
@@ -184,7 +183,7 @@ def _warn_uncertain(pose: Pose) -> None:
             f"{WHERE}: position not determined, only to {pose.error:.2g} points: do the faces belong "
             "together, turned by a few degrees at most?"
         )
-        warnings.warn(message, ConvergenceWarning, stacklevel=4)
+        warn(message, ConvergenceWarning)
 
 
 def _tilted_plane(pose: Pose, common: Array) -> Array:

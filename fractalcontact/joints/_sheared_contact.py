@@ -346,12 +346,12 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
 
 
 def over_directions(pressing: Pressing, pressed: Sequence[Columns]) -> Columns:
-    """Return columns with the direction as first axis; warn the caller's caller of steep delta-surfaces."""
+    """Return columns with the direction as first axis; warn of steep delta-surfaces."""
     from fractalcontact.contact import solver
 
     stacked = {name: np.stack([columns[name] for columns in pressed]) for name in pressed[0]}
     what, slope = f"{pressing.where}: the delta-surface", float(stacked["rms_slope"].max())
-    solver.warn_steep(what, slope, stacklevel=5)
+    solver.warn_steep(what, slope)
     return stacked
 
 

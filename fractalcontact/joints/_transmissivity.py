@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.grid import periodic_axes, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
@@ -173,7 +172,7 @@ def _warn(result: xr.Dataset) -> None:
     if not unknown:
         return
     message = f"{WHERE}: {unknown} of {result['transmissivity'].size} flows not known: {UNKNOWN}"
-    warnings.warn(message, ConvergenceWarning, stacklevel=4)
+    warn(message, ConvergenceWarning)
 
 
 @dataclass(frozen=True)

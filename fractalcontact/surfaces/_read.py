@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import netcdf
-from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
+from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile, warn
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
 from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import Array, is_real
@@ -157,7 +156,7 @@ def read(
     stated = content.entries["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
         message = f"{source.name}: the file states {stated!r} and is read in {units!r}, the argument `units`"
-        warnings.warn(message, ScaleWarning, stacklevel=3)
+        warn(message, ScaleWarning)
     _warn_of_scale(content, source.name)
     surface = content.surface
     surface.attrs = {
@@ -264,7 +263,7 @@ def _gridded_points(points: Points, request: Request) -> FileContent:
             f"{request.path.name}: the points extend over {widest:.3g} m and the file states no unit: if "
             "they are in millimetres, give units='mm'; else units='m'"
         )
-        warnings.warn(message, ScaleWarning, stacklevel=6)
+        warn(message, ScaleWarning)
     return FileContent(surface, {"stated_unit": points.unit, **points.entries, **gridding})
 
 
@@ -386,4 +385,4 @@ def _warn_of_scale(content: FileContent, name: str) -> None:
         )
     if faults:
         message = f"{name}: {'; '.join(faults)}; if the unit in the file is wrong, give `units` or `spacing`"
-        warnings.warn(message, ScaleWarning, stacklevel=4)
+        warn(message, ScaleWarning)
