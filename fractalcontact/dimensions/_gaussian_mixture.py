@@ -296,4 +296,6 @@ class Lattice:
             x = np.arange(z.size) - 0.5 * (z.size - 1)
             z = z - (z @ x)[:, None] / (x @ x) * x
             return np.asarray(np.square(fft.dct(z, 2, (1,))[:, 1:]) / (2.0 * z.size))
-        return np.asarray(np.square(fft.dct(z, 2, (0, 1))[1:, 1:]) / (4.0 * z.size))
+        power = np.square(fft.dct(z, 2, (0, 1))[1:, 1:])
+        power /= 4.0 * z.size
+        return np.asarray(power)

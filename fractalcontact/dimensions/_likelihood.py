@@ -21,13 +21,14 @@ from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.units import quantity_text
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_step, unevenness
-from fractalcontact.dimensions._filled_modes import fill, filling_ratio
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     TAPERED,
     clear_modes,
     expected_power,
+    fill,
+    filling_ratio,
     lay,
     levels_by_azimuth,
     make_bins,
@@ -48,7 +49,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     posterior,
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
-from fractalcontact.dimensions._waves import without_waves
+from fractalcontact.dimensions._waves import LARGEST_CROP, without_waves
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -83,12 +84,7 @@ class ModeFit:
         Expected power of the first fit.
     keep : ndarray of bool
         Modes that count.
-    waves : ndarray of bool
-        Modes of single waves, which do not.
-    ratio : ndarray
-        Power over pilot, half octave by half octave as expected of Gaussian heights.
     information : float or ndarray
-    lay : ndarray
     theta : ndarray
     form : int
     """
@@ -98,10 +94,7 @@ class ModeFit:
     power: Array
     pilot: Array
     keep: Array
-    waves: Array
-    ratio: Array
     information: Array | float
-    lay: Array
     theta: Array
     form: int
 
@@ -129,9 +122,9 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     fit = fitted_modes(surface, spread)
     if fit is None:
         return undefined(_NO_MODES)
-    wavelength = 2.0 * np.pi / fit.lattice.q * surface.spacing[1]
     keep = fit.keep
     if window is not None:
+        wavelength = 2.0 * np.pi / fit.lattice.q * surface.spacing[1]
         keep = keep & (wavelength >= window[0] * (1.0 - 1e-9)) & (wavelength <= window[1] * (1.0 + 1e-9))
     number = int(np.count_nonzero(keep))
     if number < LEAST * _LEAST_BINS and window is None and keep.size > 4 * LEAST * _LEAST_BINS:
@@ -170,11 +163,10 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
     if min(heights.shape[-surface.axes :]) < 4:
         return None
     heights = heights - heights[observed].mean() if is_periodic else _without_plane(heights)
-    heights[~observed] = np.nan
     scale = _rms_increment(heights)
     heights /= scale
     filled = fill(heights)
-    theta, form, ratio_of_lags = _first_fit(filled, lattice, spread)
+    theta, form, ratio_of_lags = _first_fit(filled, lattice, spread, is_complete)
     lattice = replace(lattice, stretch=ratio_of_lags)
     if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
         return None
@@ -182,23 +174,22 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
     correction: Array | float = 1.0
     information: Array | float = 1.0
     for rounds in range(_ROUNDS, -1, -1):
-        pilot, clean = expected_power(lattice, theta, form)
+        pilot, clean = (expected_power(lattice, theta, form, edges=edges) for edges in (True, False))
         sharp = theta.copy()
         sharp[SPREAD] = 0.0
-        unblurred = expected_power(lattice, sharp, form)[1] if theta[SPREAD] > 0.0 else clean
+        unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
         keep = clear_modes(pilot, clean, unblurred)
         if not is_complete:
             correction = filling_ratio(lattice, pilot, observed)
             information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
-        power = modes / correction
+        power = modes if is_complete else modes / correction
         keep &= power > _EMPTY * pilot
         if not keep.any():
             return None
         ratio = whitened(lattice, power, pilot, keep)
-        waves = single_waves(lattice, ratio, keep)
-        keep &= ~waves
+        keep &= ~single_waves(lattice, ratio, keep)
         levels = levels_by_azimuth(lattice, ratio, keep)
-        level = lay(levels)
+        level = lay(lattice, levels)
         if not rounds:
             break
         ratio_of_lags = stretch(lattice, levels, unblurred)
@@ -210,20 +201,26 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
             form = hypothesis.form
         lattice = replace(lattice, stretch=ratio_of_lags)
     information = information / unevenness(heights)
-    return ModeFit(
-        lattice, scale, power / level, pilot, keep, waves, ratio / level, information, level, theta, form
-    )
+    power /= level
+    return ModeFit(lattice, scale, power, pilot, keep, information, theta, form)
 
 
-def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[Array, int, float]:
-    """Return theta, form and stretch from the modes of the tapered surface.
+def _first_fit(
+    heights: Array, lattice: Lattice, spread: float | None, is_complete: bool
+) -> tuple[Array, int, float]:
+    """Return theta, form and stretch from the modes of the tapered surface, or of its middle.
 
     Its edges do not leak into short waves.
     """
-    torus = Lattice(lattice.shape, lattice.spacing, True)
-    if lattice.axes == 2 and not lattice.periodic:  # offsets of rows and columns are in none of the modes
+    edge = LARGEST_CROP ** (3 - lattice.axes)
+    is_part = is_complete and max(heights.shape) > edge
+    if is_part:
+        heights = heights[tuple(slice(max(0, n - edge) // 2, (n + edge) // 2) for n in heights.shape)]
+    is_periodic = lattice.periodic and not is_part
+    torus = Lattice((heights.shape[0], heights.shape[1]), lattice.spacing, True)
+    if lattice.axes == 2 and not is_periodic:  # offsets of rows and columns are in none of the modes
         heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
-    tapers = [window_weights(n, None if n == 1 or lattice.periodic else "hann") for n in lattice.shape]
+    tapers = [window_weights(n, None if n == 1 or is_periodic else "hann") for n in heights.shape]
     power = torus.power(heights * (tapers[0][:, None] * tapers[1]))
     pilot = torus.q ** (-1.0 - torus.axes)
     inside = power > _EMPTY * float(np.max(power / pilot)) * pilot
@@ -234,7 +231,7 @@ def _first_fit(heights: Array, lattice: Lattice, spread: float | None) -> tuple[
     torus = replace(torus, stretch=stretch(torus, levels, pilot, information=TAPERED))
     y, x = torus.wavenumbers
     pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
-    bins = make_bins(torus, power, pilot, keep, is_tapered=not lattice.periodic)
+    bins = make_bins(torus, power, pilot, keep, is_tapered=not is_periodic)
     hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
     return theta, hypothesis.form, torus.stretch
 
@@ -256,10 +253,11 @@ def _without_rim(heights: Array) -> Array:
 def _rms_increment(heights: Array) -> float:
     """Return the rms increment over one spacing along x, or along y if there is none."""
     for axis in (1, 0):
-        steps = np.diff(heights, axis=axis)
-        square = float(np.nanvar(steps)) if np.isfinite(steps).any() else 0.0
+        steps = np.diff(heights, axis=axis).ravel()
+        steps = steps if np.isfinite(steps.sum()) else steps[np.isfinite(steps)]
+        square = float(steps @ steps)
         if square > 0.0:
-            return math.sqrt(square)
+            return math.sqrt(square / steps.size)
     return 1.0
 
 

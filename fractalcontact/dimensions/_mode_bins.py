@@ -4,6 +4,10 @@ Bins are a third of an octave wide; where aliases matter, the modes near the axe
 have bins of their own, because aliases and filters of the points differ there. Left out are modes whose
 power is mostly that of the edges (they are correlated), or is taken by a filter but for a thousandth, and
 those of single waves.
+
+Gaps are filled, which lowers the power of short waves. Surfaces of Gaussian modes with the expected power of
+a pilot get the same gaps and the same filling; the ratio of their power after and before, in bins, corrects
+that of the surface. One treatment serves points, blocks, rims and lines of gaps.
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
 from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, spread_nodes, weights
 from fractalcontact.dimensions._spectral_posterior import tail
@@ -23,6 +28,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
+_SWEEPS = 12  # over missing points, after the pyramid: the fill of single points is then harmonic to 1 %
+_SIMULATED = 1 << 18  # modes that are simulated: the correction scatters by a fifth of the error of H
+_MOST = 8  # surfaces
 _SAMPLE = 64  # modes of a bin over which an expectation is averaged: error below that of the pilot, .1 %
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _LEAK = 0.5  # share of the edges in the expected power from which on neighbouring modes are correlated
@@ -36,59 +44,54 @@ _STRETCHES = 121  # steps of 3.5 %; in 128 x 128 points a stretch of 2 scatters 
 _OCTAVE = math.log(2.0)
 
 
-def expected_power(lattice: Lattice, theta: Array, form: int) -> tuple[Array, Array]:
-    """Return the expected power of each mode, and that part of it that is not due to the edges."""
+def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = True) -> Array:
+    """Return the expected power of each mode, or that part of it that is not due to the edges."""
     weight = weights(theta[0], lattice.t)
     weight[-1] *= tail(theta[0], lattice.t[-1], theta[1], form, lattice.axes)
-    powers = []
-    for edges in (True, False):
-        rows, columns = lattice.transforms(float(theta[1]), edges=edges)[form]
-        power = (rows * weight[:, None]).T @ columns
-        np.maximum(power, 1e-300, out=power)
-        powers.append(power)
+    rows, columns = lattice.transforms(float(theta[1]), edges=edges)[form]
+    power = (rows * weight[:, None]).T @ columns
+    np.maximum(power, 1e-300, out=power)
     if theta[3] > 0.0:
         corner = 2.0 * theta[5] * np.log(theta[3] / lattice.q)
-        bend = np.exp((theta[4] - theta[0]) / theta[5] * np.logaddexp(0.0, corner))
-        for power in powers:
-            power *= bend
-    for power in powers:
-        power += theta[2] ** 2
-    return powers[0], powers[1]
+        power *= np.exp((theta[4] - theta[0]) / theta[5] * np.logaddexp(0.0, corner))
+    power += theta[2] ** 2
+    return np.asarray(power)
 
 
 def clear_modes(total: Array, clean: Array, unblurred: Array) -> Array:
     """Return the modes that neither the edges nor a filter dominate; see `expected_power`."""
-    return np.asarray((clean >= (1.0 - _LEAK) * total) & (clean > _TAIL * unblurred))
+    rows = zip(total, clean, unblurred, strict=True)
+    return np.array([(c >= (1.0 - _LEAK) * t) & (c > _TAIL * u) for t, c, u in rows])
 
 
 def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array:
     """Return power over pilot, with the median of each half octave as expected of Gaussian heights."""
-    number, count = _joined(*_classes(lattice, keep, 0.5 * _OCTAVE, math.inf))
+    classes = _classes(lattice, keep, 0.5 * _OCTAVE, math.inf)
     ratio = power / pilot
-    factor = np.ones(count.size + 1)  # the last one of modes that do not count
-    for octave, places in enumerate(_Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE).places):
-        values = ratio.ravel()[places[places >= 0]]
+    places = _sums(classes, ratio, lattice, _MEDIAN_SAMPLE)[2]
+    factor = np.ones(classes.count.size + 1)  # the last one of modes that do not count
+    for octave, chosen in enumerate(places):
+        values = ratio.ravel()[chosen[chosen >= 0]]
         factor[octave] = lattice.median / max(float(np.median(values)), 1e-300)
-    for row, octaves in zip(ratio, number, strict=True):  # no second array of the size of the surface
-        row *= factor[octaves]
+    factor = factor[classes.joined]
+    for row, number in zip(ratio, classes.number, strict=True):  # no second array of the size of the surface
+        row *= factor[number]
     return ratio
 
 
 def single_waves(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     """Return the modes of single waves: boxes whose mean power is improbable for Gaussian heights."""
-    from scipy.ndimage import maximum_filter, uniform_filter
     from scipy.special import chdtri
 
-    size = (1, 3) if lattice.axes == 1 else (3, 3)
-    degrees = lattice.degrees * math.prod(size)
-    limit = float(chdtri(degrees, _FALSE_ALARM / ratio.size)) / degrees
+    size = 3**lattice.axes
+    limit = float(chdtri(lattice.degrees * size, _FALSE_ALARM / ratio.size)) / lattice.degrees
     marked = np.zeros(ratio.shape, dtype=bool)
-    for _ in range(3):  # what is left out no longer lifts its neighbours
-        level = np.where(keep & ~marked, ratio, 1.0)
-        found = uniform_filter(level, size, mode="constant") > limit
-        if not (found & keep & ~marked).any():
-            break
-        marked |= maximum_filter(found, size)
+    for row in range(ratio.shape[0]):
+        rows = slice(max(row - 1, 0), row + 2)
+        level = np.where(keep[rows], ratio[rows], 1.0).sum(axis=0)
+        sums = np.convolve(level, np.ones(3), "same")
+        for column in np.flatnonzero(sums > limit):
+            marked[rows, max(column - 1, 0) : column + 2] = True
     return marked
 
 
@@ -98,18 +101,16 @@ class Levels:
 
     Attributes
     ----------
-    sector : ndarray of int
-        Of each mode.
     level, information : ndarray, shape (sectors,)
         Logarithm of the mean power over that expected, and the inverse of its variance; 0 without modes.
-    keep : ndarray of bool
-        Modes that were averaged.
+    rows, columns : ndarray of int
+        Of the modes that were averaged.
     """
 
-    sector: Array
     level: Array
     information: Array
-    keep: Array
+    rows: Array
+    columns: Array
 
 
 def stretch(lattice: Lattice, levels: Levels, unblurred: Array, *, information: float = 1.0) -> float:
@@ -124,9 +125,10 @@ def stretch(lattice: Lattice, levels: Levels, unblurred: Array, *, information: 
     level, weight = levels.level, levels.information
     if np.count_nonzero(weight) < 3:  # a profile has one
         return 1.0
-    lnq = np.log(lattice.q[levels.keep])
+    y, x = lattice.wavenumbers
+    lnq = np.log(np.hypot(y[levels.rows], x[levels.columns]))
     lnq -= lnq.mean()
-    slope = lnq @ np.log(unblurred[levels.keep]) / (lnq @ lnq)
+    slope = lnq @ np.log(unblurred[levels.rows, levels.columns]) / (lnq @ lnq)
     azimuth = 0.5 * math.pi / _SECTORS * (np.arange(_SECTORS) + 0.5)
     logarithms = np.r_[np.linspace(-_STRETCH, _STRETCH, _STRETCHES), math.log(lattice.stretch)]
     squares = np.cos(azimuth) ** 2 + np.sin(azimuth) ** 2 * np.exp(-2.0 * logarithms[:, None])
@@ -139,7 +141,7 @@ def stretch(lattice: Lattice, levels: Levels, unblurred: Array, *, information: 
     return math.exp(logarithms[best] * (1.0 - by_chance / gain)) if gain > by_chance else 1.0
 
 
-def lay(levels: Levels) -> Array:
+def lay(lattice: Lattice, levels: Levels) -> Array | float:
     """Return the relative power of the azimuth of each mode, shrunk to one as far as chance explains it.
 
     An anisotropic self-affine surface has a level of its own in each direction, and the same exponent. The
@@ -150,9 +152,10 @@ def lay(levels: Levels) -> Array:
 
     square = float(levels.information @ np.square(levels.level))
     freedom = np.count_nonzero(levels.information) - 1
-    by_chance = float(chdtri(freedom, _FALSE_ALARM)) if freedom > 0 else math.inf
-    shrunk = 1.0 - by_chance / square if square > by_chance else 0.0
-    return np.asarray(np.exp(shrunk * levels.level)[levels.sector])
+    if not freedom > 0 or square <= (by_chance := float(chdtri(freedom, _FALSE_ALARM))):
+        return 1.0
+    y, x = lattice.wavenumbers
+    return np.asarray(np.exp((1.0 - by_chance / square) * levels.level)[_sectors(y[:, None], x)])
 
 
 def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
@@ -160,19 +163,28 @@ def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
     from scipy.special import digamma, polygamma
 
     y, x = lattice.wavenumbers
-    scale = 2.0 * _SECTORS / math.pi
-    sector = np.minimum((np.arctan2(np.abs(y)[:, None], np.abs(x)) * scale).astype(np.int16), _SECTORS - 1)
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
-    keep = keep & (lattice.q * max(lattice.spacing) < _ISOTROPIC)
-    count = np.bincount(sector[keep], minlength=_SECTORS)
+    limit = _ISOTROPIC / max(lattice.spacing)
+    near_y, near_x = (np.flatnonzero(np.abs(along) < limit) for along in (y, x))
+    is_near = np.hypot(y[near_y, None], x[near_x]) < limit
+    rows, columns = np.nonzero(keep[np.ix_(near_y, near_x)] & is_near)
+    rows, columns = near_y[rows], near_x[columns]
+    sector = _sectors(y[rows], x[columns])
+    count = np.bincount(sector, minlength=_SECTORS)
     known = count > 0
     degrees = 0.5 * lattice.degrees * count[known]
     level, information = np.zeros(_SECTORS), np.zeros(_SECTORS)
     information[known] = 1.0 / polygamma(1, degrees)
-    mean = np.bincount(sector[keep], ratio[keep], minlength=_SECTORS)[known] / count[known]
+    mean = np.bincount(sector, ratio[rows, columns], minlength=_SECTORS)[known] / count[known]
     values = np.log(np.maximum(mean, 1e-12)) + np.log(degrees) - digamma(degrees)
     level[known] = values - information[known] @ values / information.sum() if known.any() else 0.0
-    return Levels(sector, level, information, keep)
+    return Levels(level, information, rows, columns)
+
+
+def _sectors(y: Array, x: Array) -> Array:
+    """Return the sector of azimuth of wavenumbers."""
+    sector = (np.arctan2(np.abs(y), np.abs(x)) * (2.0 * _SECTORS / math.pi)).astype(np.int16)
+    return np.minimum(sector, _SECTORS - 1)
 
 
 def make_bins(
@@ -202,29 +214,30 @@ def make_bins(
 
     width = _OCTAVE / PER_OCTAVE
     split = math.log(_ALIASED) if lattice.axes == 2 and not is_tapered else math.inf
-    number, count = _joined(*_classes(lattice, keep, width, split))
-    ratio = power / pilot
-    sums = _Sums(number, count, ratio, lattice, _MEDIAN_SAMPLE if is_tapered else _SAMPLE)
-    mean = sums.total / count
+    classes = _classes(lattice, keep, width, split)
+    ratio, count = power / pilot, classes.count
+    total, lnq, places = _sums(classes, ratio, lattice, _MEDIAN_SAMPLE if is_tapered else _SAMPLE)
+    mean = total / count
     if is_tapered:
-        values = np.where(sums.places >= 0, ratio.ravel()[sums.places], np.nan)
+        values = np.where(places >= 0, ratio.ravel()[places], np.nan)
         mean = np.nanmedian(values, axis=1) / lattice.median
     share = information
     if np.ndim(information) > 0:
-        share = _Sums(number, count, np.asarray(information), lattice, 1).total / count
+        share = _sums(classes, np.asarray(information), lattice, 1)[0] / count
     degrees = 0.5 * lattice.degrees * count * share * (TAPERED if is_tapered else 1.0)
     level = np.log(np.maximum(mean, 1e-300)) + np.log(degrees) - digamma(degrees)
     # expectations of an even sample of each bin
-    chosen = sums.places[:, :: max(1, sums.places.shape[1] // _SAMPLE)]
+    chosen = places[:, :: max(1, places.shape[1] // _SAMPLE)]
     bins, place = np.nonzero(chosen >= 0)[0], chosen[chosen >= 0]
     weight = 1.0 / (pilot.ravel()[place] * np.bincount(bins)[bins])
     rows, columns = np.divmod(place, pilot.shape[1])
+    ends = np.cumsum(np.bincount(bins))
     spreads, nodes = spread_nodes(max(1.0, lattice.shortest_edge / 12.0))
     tables = np.zeros((len(FORMS), spreads.size, count.size, lattice.t.size))
     for k, spread in enumerate(spreads):
         transforms = lattice.transforms(float(spread), edges=True)
         for table, (along_y, along_x) in zip(tables, transforms, strict=True):
-            _average(weight, bins, rows, columns, along_y, along_x, table[k])
+            _average(weight, ends, rows, columns, along_y, along_x, table[k])
     return Bins(
         level=level,
         variance=np.asarray(polygamma(1, degrees)),
@@ -233,78 +246,144 @@ def make_bins(
         nodes=nodes,
         t=lattice.t,
         white=np.bincount(bins, weight),
-        lnq=sums.lnq / count,
+        lnq=lnq / count,
         extent=lattice.longest,
         axes=lattice.axes,
     )
 
 
-class _Sums:
-    """Sums over the modes of each class, and an even sample of them.
+def fill(heights: Array) -> Array:
+    """Return heights whose missing points have the mean of their surroundings, of the pyramid of 2 x 2 means.
+
+    Some sweeps then move each missing point to the mean of its four neighbours.
+    """
+    observed = np.isfinite(heights)
+    if observed.all():
+        return heights
+    if heights.shape[0] == 1:
+        places = np.arange(heights.size)
+        return np.asarray(np.interp(places, places[observed[0]], heights[observed])[None])
+    filled = _means(np.where(observed, heights, 0.0), observed.astype(float))
+    flat, (ny, nx) = filled.ravel(), heights.shape
+    rows, columns = np.nonzero(~observed)
+    above, below = np.maximum(rows - 1, 0) * nx + columns, np.minimum(rows + 1, ny - 1) * nx + columns
+    left, right = rows * nx + np.maximum(columns - 1, 0), rows * nx + np.minimum(columns + 1, nx - 1)
+    missing = rows * nx + columns
+    for _ in range(_SWEEPS):
+        flat[missing] = 0.25 * (flat[above] + flat[below] + flat[left] + flat[right])
+    return filled
+
+
+def _means(values: Array, weights: Array) -> Array:
+    """Return values over weights where there are any, the same of sums of 2 x 2 points elsewhere."""
+    mean = np.divide(values, weights, out=np.zeros_like(values), where=weights > 0.0)
+    rows, columns = np.nonzero(weights == 0.0)
+    if rows.size and max(values.shape) > 1:
+        mean[rows, columns] = _means(_halved(values), _halved(weights))[rows // 2, columns // 2]
+    return mean
+
+
+def _halved(values: Array) -> Array:
+    """Return the sums of 2 x 2 points."""
+    for _ in range(2):
+        sums = values[::2].copy()
+        sums[: len(values) // 2] += values[1::2]
+        values = sums.T
+    return values
+
+
+def filling_ratio(lattice: Lattice, pilot: Array, observed: Array) -> Array:
+    """Return the power of modes after filling over that before, for Gaussian modes of the pilot."""
+    stream = np.random.default_rng(1)
+    number = max(1, min(_MOST, math.ceil(_SIMULATED / pilot.size)))
+    before, after = np.zeros_like(pilot), np.zeros_like(pilot)
+    inner = (slice(None), slice(1, None)) if lattice.axes == 1 else (slice(1, None), slice(1, None))
+    axes = (1,) if lattice.axes == 1 else (0, 1)
+    size = math.prod(lattice.shape[-lattice.axes :])
+    for _ in range(number):
+        modes = np.zeros(lattice.shape)
+        modes[inner] = np.sqrt(pilot) * stream.standard_normal(pilot.shape)
+        heights = fft.dct(modes, 3, axes) / math.sqrt(2.0**lattice.axes * size)
+        before += modes[inner] ** 2
+        after += lattice.power(fill(np.where(observed, heights, np.nan)))
+    classes = _classes(lattice, np.ones(pilot.shape, dtype=bool), _OCTAVE / PER_OCTAVE, -math.inf)
+    filled, complete = (_sums(classes, power / pilot, lattice, 1)[0] for power in (after, before))
+    ratio = np.divide(filled, complete, out=np.ones_like(filled), where=complete > 0.0)
+    return np.asarray(np.maximum(ratio, 1e-12)[classes.joined[classes.number]])
+
+
+@dataclass(frozen=True)
+class _Classes:
+    """Classes of modes.
 
     Attributes
     ----------
-    total, lnq : ndarray, shape (classes,)
-        Of the values and of the logarithms of the wavenumbers.
-    places : ndarray of int, shape (classes, size)
-        Flat indices of the sample, -1 where a class has fewer modes.
+    number : ndarray of int
+        Of each mode, -1 of those that do not count.
+    joined : ndarray of int
+        Class that a number is joined with; -1 for the last.
+    count : ndarray, shape (classes,)
+        Modes in each class.
     """
 
-    def __init__(self, number: Array, count: Array, values: Array, lattice: Lattice, size: int) -> None:
-        self.total, self.lnq = np.zeros(count.size), np.zeros(count.size)
-        self.places = np.full((count.size, size), -1)
-        y, x = lattice.wavenumbers
-        rank, filled = np.zeros(count.size), np.zeros(count.size, dtype=np.int64)
-        _add(number, values, y, x, count, rank, filled, self.total, self.lnq, self.places)
+    number: Array
+    joined: Array
+    count: Array
 
 
-def _classes(lattice: Lattice, keep: Array, width: float, split: float) -> tuple[Array, Array]:
-    """Return the class of each mode, -1 of those that do not count, and the number of modes in each class.
+def _classes(lattice: Lattice, keep: Array, width: float, split: float) -> _Classes:
+    """Return the classes of modes: rings of `width` in ln q, those of few modes joined with the next.
 
-    Rings of `width` in ln q; from ln q = `split` on, modes near a diagonal are a class of their own.
+    From ln q = `split` on, modes near a diagonal are a class of their own.
     """
-    lowest = math.log(float(np.min(lattice.q, where=keep, initial=math.inf)))
-    rings = int((math.log(float(lattice.q.max())) - lowest) / width) + 2
-    number, count = np.full(keep.shape, -1, dtype=np.int16), np.zeros(2 * rings)
     y, x = lattice.wavenumbers
-    _classify(y, x, lattice.spacing[0], keep, lowest, width, split, number, count)
-    return number, count
-
-
-def _joined(number: Array, count: Array) -> tuple[Array, Array]:
-    """Join classes of few modes with the next."""
-    joined, total, bins = np.zeros(count.size + 1, dtype=np.int16), 0.0, 0
-    for k, modes in enumerate(count):
+    first = keep.argmax(axis=1)
+    lowest = math.log(float(np.min(np.hypot(y, x[first]), where=keep.any(axis=1), initial=math.inf)))
+    highest = math.log(math.hypot(np.abs(y).max(), np.abs(x).max()))
+    rings = int((highest - lowest) / width) + 2
+    ends = np.exp(2.0 * (lowest + width * (np.arange(1.0, rings + 1.0) - 1e-9)))
+    number, counts = np.full(keep.shape, -1, dtype=np.int16), np.zeros(2 * rings)
+    _classify(y, x, lattice.spacing[0], keep, ends, (split - lowest) / width, number, counts)
+    joined, total, bins = np.zeros(counts.size + 1, dtype=np.int16), 0.0, 0
+    for k, modes in enumerate(counts):
         joined[k] = bins
         total += modes
         if total >= LEAST:
             bins, total = bins + 1, 0.0
     joined = np.minimum(joined, max(bins - 1, 0))
-    sums = np.bincount(joined[:-1], count)
+    count = np.bincount(joined[:-1], counts)
     joined[-1] = -1
-    return joined[number], sums
+    return _Classes(number, joined, count)
+
+
+def _sums(classes: _Classes, values: Array, lattice: Lattice, size: int) -> tuple[Array, Array, Array]:
+    """Return the sums over each class of the values and of ln q, and an even sample of its modes.
+
+    The sample are flat indices, shape (classes, size), -1 where a class has fewer modes.
+    """
+    count = classes.count
+    total, lnq, rank = (np.zeros(count.size) for _ in range(3))
+    places, filled = np.full((count.size, size), -1), np.zeros(count.size, dtype=np.int64)
+    y, x = lattice.wavenumbers
+    _add(classes.number, classes.joined, values, y, x, count, rank, filled, total, lnq, places)
+    return total, lnq, places
 
 
 @kernel
 def _classify(
-    y: Array,
-    x: Array,
-    dy: float,
-    keep: Array,
-    lowest: float,
-    width: float,
-    split: float,
-    number: Array,
-    count: Array,
+    y: Array, x: Array, dy: float, keep: Array, ends: Array, split: float, number: Array, count: Array
 ) -> None:
-    """Fill the class of each mode, and count them; see `_classes`."""
+    """Fill the class of each mode, and count them; x ascends. `ends` are squared wavenumbers of the rings."""
     for r in range(y.size):
+        ring = 0
         for c in range(x.size):
+            square = y[r] * y[r] + x[c] * x[c]
+            while square >= ends[ring]:
+                ring += 1
             if not keep[r, c]:
                 continue
-            ring = int((0.5 * math.log(y[r] * y[r] + x[c] * x[c]) - lowest) / width + 1e-9)
             k = 2 * ring
-            if lowest + width * ring > split:
+            if ring > split:
                 a, b = abs(y[r]) * dy, abs(x[c])
                 k += (a if a < b else b) > math.tan(math.pi / 8.0) * (b if a < b else a)
             number[r, c] = k
@@ -314,6 +393,7 @@ def _classify(
 @kernel
 def _add(
     number: Array,
+    joined: Array,
     values: Array,
     y: Array,
     x: Array,
@@ -328,9 +408,9 @@ def _add(
     size = places.shape[1]
     for r in range(y.size):
         for c in range(x.size):
-            k = number[r, c]
-            if k < 0:
+            if number[r, c] < 0:
                 continue
+            k = joined[number[r, c]]
             total[k] += values[r, c]
             lnq[k] += 0.5 * math.log(y[r] * y[r] + x[c] * x[c])
             share = size / count[k]
@@ -342,9 +422,14 @@ def _add(
 
 @kernel
 def _average(
-    weight: Array, number: Array, rows: Array, columns: Array, along_y: Array, along_x: Array, table: Array
+    weight: Array, ends: Array, rows: Array, columns: Array, along_y: Array, along_x: Array, table: Array
 ) -> None:
-    """Add the weighted products of the transforms of modes to their bins; table (bin, t)."""
+    """Fill the weighted sums of the products of the transforms of modes, bin by bin; table (bin, t)."""
     for j in range(table.shape[1]):
-        for m in range(weight.size):
-            table[number[m], j] += weight[m] * along_y[j, rows[m]] * along_x[j, columns[m]]
+        m = 0
+        for b in range(ends.size):
+            total = 0.0
+            while m < ends[b]:
+                total += weight[m] * along_y[j, rows[m]] * along_x[j, columns[m]]
+                m += 1
+            table[b, j] = total

@@ -21,7 +21,7 @@ Scales = tuple[float, float] | None
 ROUNDING = 1e-12  # of the range of heights
 DECADES = 250  # powers of ten of a metre: heights are scaled before they are used
 SMALLEST_UNIT, LARGEST_UNIT = 2.0**-450, 2.0**450  # m: ranges whose second and fourth powers are finite
-MIDDLE = 256  # points to each side of the middle that are inspected for interpolation
+MIDDLE = 128  # points to each side of the middle that are inspected for interpolation
 LARGEST = 4096  # edge of what is transformed at a time of a surface that is not in memory, 134 MB
 SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
 
