@@ -314,6 +314,8 @@ def fit_hyperbola(pressure: Array, closure: Array, level: float) -> Fit:
     def squared_misfit(log_half: float) -> float:
         return float(np.sum(best_curve(math.exp(log_half))[1] ** 2))
 
+    # four steps to a factor of e, from far below the pressures to far above; of 150 drawn paths two and eight
+    # steps give the same, up to 7 in place of 14 one other Vm, from -3 in place of -7 two
     grid = np.linspace(math.log(p.min()) - 7.0, 14.0, 85)
     misfits = [squared_misfit(log_half) for log_half in grid]
     best = int(np.argmin(misfits))

@@ -232,7 +232,9 @@ def estimate_length(
     sums: TileSums,
     shears: Array,
     edge: float,
-    fewest: float = 15.0,  # lengths in an edge, below which the interval does not cover
+    # lengths in an edge: of 40 intervals on faces of exponential correlation 31 hold the length with 8, 34
+    # with 11, 39 with 15, 37 with 20
+    fewest: float = 15.0,
     quantile: float = 2.776,  # of Student's t for 4 degrees of freedom: covers 95 % on faces of known length
 ) -> Length:
     """Return the shear at which the correlation has fallen to 1/e of that at no shear, with its interval.

@@ -174,6 +174,7 @@ def _solve(system: System, start: Array, order: Array, largest_direct: int) -> A
     options = {"SymmetricMode": True, "DiagPivotThresh": 0.0}
     try:
         ordered = matrix[order][:, order].tocsc()
+        # other sizes of panels and of relaxed supernodes take the same time within a tenth
         factors = splu(ordered, permc_spec="NATURAL", relax=1, panel_size=8, options=options)
     except RuntimeError:  # a pivot of 0: links to a part of the plane are lost in the rounding of its own
         return start
@@ -214,7 +215,7 @@ def _multigrid(matrix: Any) -> Any:
         levels.append(MultilevelSolver.Level())
         levels[-1].A, size = matrix, matrix.shape[0]
         if size > 400:  # fewer are solved directly in a millisecond
-            strong = classical_strength_of_connection(matrix, theta=0.1)
+            strong = classical_strength_of_connection(matrix)
             joined = standard_aggregation(strong)[0].astype(np.float64)
             weights = diags_array(4.0 / 3.0 / abs(matrix).sum(axis=1))
             levels[-1].P = (joined - weights @ (matrix @ joined)).tocsr()

@@ -377,7 +377,8 @@ def _refine(
     max_steps : int
         16 faces, half of them with noise, took 5 to 14 at all widths together.
     full_steps : int
-        Of full length; damped ones after them end a cycle of the robust weights. 5 and 20 gave the same.
+        Of full length; damped ones after them end a cycle of the robust weights: of 120 pairs with noise and
+        damage 84 converge, 74 without them. 5 and 20 gave the same.
     small_step : float
         In cells at the edge, that ends the iteration. 2e-4 moved faces with noise of .1 and 1 increment by up
         to .012 of the standard error, 5e-5 by .0007, with one or two iterations more.
@@ -473,10 +474,11 @@ def _robust_weights(columns: Array, target: Array) -> tuple[Array, float]:
         return np.zeros(target.size), 1.0
     plane = columns[3:]
     residual = target - np.linalg.lstsq(plane.T, target, rcond=None)[0] @ plane
+    # standard deviation of a Gaussian, from its median absolute deviation
     deviation = 1.4826 * float(np.median(np.abs(residual - np.median(residual))))
     if deviation == 0:
         return np.ones(target.size), 1.0
-    square = (residual / (2.385 * deviation)) ** 2
+    square = (residual / (2.385 * deviation)) ** 2  # 95 % efficient (Holland and Welsch 1977)
     weights = 1.0 / (1.0 + square)
     return weights, float(np.sum(weights) / np.sum((1.0 - square) * weights**2))
 

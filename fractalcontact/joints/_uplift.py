@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,16 +55,14 @@ def _check(problems: Problems) -> None:
     both = given.normal_stiffness is not None and given.total_stress is not None
     problems.require(not both, "total_stress / normal_stiffness", "one of them", "both of them")
     has_gap = _flow_network.check_gap(problems, given.gap, RESULTS)
-    plane = given.gap if has_gap else None
-    sides = [
-        _check_side(problems, name, getattr(given, name), plane)
-        for name in ("upstream", "downstream")
-        if name == "upstream" or given.downstream is not None
-    ]
+    gap = given.gap if has_gap else None
+    has_sides = _check_side(problems, "upstream", given.upstream, gap)
+    if given.downstream is not None:
+        has_sides &= _check_side(problems, "downstream", given.downstream, gap)
     has_drains = given.drains is not None and problems.numbers("drains", any_shape=True)
     if not has_gap:
         return
-    if all(sides):
+    if has_sides:
         high_side, low_side = _sides(given.upstream, given.downstream, given.gap)
         differ = high_side.axis != low_side.axis or high_side.place != low_side.place
         problems.require(differ, "downstream", "another edge or line than upstream")
@@ -105,8 +104,9 @@ def _check_drains(problems: Problems, drains: Any, gap: xr.DataArray) -> None:
 
 def _check_path(problems: Problems, gap: xr.DataArray) -> None:
     expected = "a gap over step whose nominal_pressure rises, as `joints.closure` returns it"
-    if "step" not in gap.dims[:-2] or "nominal_pressure" not in gap.coords or gap.sizes["step"] < 2:
-        problems.add("total_stress", expected, f"dims {gap.dims}, coordinates {list(gap.coords)}")
+    is_path = "step" in gap.dims[:-2] and "nominal_pressure" in gap.coords and gap.sizes["step"] > 1
+    got = f"dims {gap.dims}, coordinates {list(gap.coords)}"
+    if not problems.require(is_path, "total_stress", expected, got):
         return
     stresses = _path_stresses(gap)
     rises = bool(np.isfinite(stresses).all() and (stresses >= 0).all() and (np.diff(stresses) > 0).all())
@@ -218,18 +218,21 @@ def uplift(
     for name in (*names, *(ON_PATH if total_stress is not None else ())):
         result[name] = leading, np.reshape([getattr(state, name) for state in states], gap.shape[:-2])
     _explain(result)
-    _explain_unconverged(result)
-    plane_coords = {dim: gap[dim].variable for dim in ("y", "x")}
-    return result.assign_coords(leading_coords(gap, leading, taken=RESULTS) | plane_coords).assign_attrs(
-        achieved_residual=max(state.residual for state in states)
-    )
+    coords = leading_coords(gap, leading, taken=RESULTS) | {dim: gap[dim].variable for dim in ("y", "x")}
+    residual = max(state.residual for state in states)
+    return result.assign_coords(coords).assign_attrs(achieved_residual=residual)
 
 
 def _explain(result: xr.Dataset) -> None:
-    """Give NaN where nothing balances, and the reasons of all NaN."""
-    is_known, reason = result["residual"] <= ERROR, UNKNOWN
-    if "effective_stress" in result and is_known.all():
-        is_known, reason = result["effective_stress"].notnull(), OFF_THE_PATH
+    """Give NaN where nothing balances, and say why, and why an iteration did not converge."""
+    is_known, reason, unconverged = result["residual"] <= ERROR, UNKNOWN, UNKNOWN
+    if is_known.all():
+        unconverged = "opening and flow did not come to balance"
+        if "effective_stress" in result:
+            is_known, reason = result["effective_stress"].notnull(), OFF_THE_PATH
+            unconverged = "no effective stress on the path balances the total stress"
+    if not result["converged"].all():
+        result["converged"].attrs["reason"] = unconverged
     if is_known.all():
         return
     for name in {"effective_stress", "wet_fraction", "isolated_fraction", *FORCES} & set(result):
@@ -443,14 +446,8 @@ def _balanced(
     """
     from scipy.optimize import brentq
 
-    solved: dict[float, State] = {}  # the search asks again for the steps that enclose the balance
-
+    @cache  # the search asks again for the steps that enclose the balance
     def state(place: float) -> State:
-        if place not in solved:
-            solved[place] = solve(place)
-        return solved[place]
-
-    def solve(place: float) -> State:
         step = min(int(place), len(stresses) - 2)
         share, (low, high) = place - step, stresses[step : step + 2]
         stress = low * (high / low) ** share if low > 0 else share * high
@@ -467,24 +464,10 @@ def _balanced(
         place, above = place - 1, found
         found = state(place)
     if found.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
-        root = brentq(lambda at: state(at).balance_error, place, place + 1, xtol=place_error)
-        return state(root)._replace(iterations=len(solved))
-    found = found._replace(iterations=len(solved))
-    if found.converged:
-        return found
-    return found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
-
-
-def _explain_unconverged(result: xr.Dataset) -> None:
-    """Say why the iteration of some gaps did not converge."""
-    if not (result["residual"] <= ERROR).all():
-        reason = UNKNOWN
-    elif "balance_error" in result:
-        reason = "no effective stress on the path balances the total stress"
-    else:
-        reason = "opening and flow did not come to balance"
-    if not result["converged"].all():
-        result["converged"].attrs["reason"] = reason
+        found = state(brentq(lambda at: state(at).balance_error, place, place + 1, xtol=place_error))
+    elif not found.converged:
+        found = found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
+    return found._replace(iterations=state.cache_info().currsize)
 
 
 Knots = dict[str, tuple[Array, Array]]
