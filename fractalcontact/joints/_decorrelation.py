@@ -162,8 +162,8 @@ def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[TileSu
     order = 0 if any(layout.wraps) else 1
     faces = [crack.lower] if crack.upper is None else [crack.lower, crack.upper]
     heights = [np.asarray(face.values, dtype=np.float64) for face in faces]
-    planes = [_without_rounding(detrended(face, order)[0], face) for face in heights]
-    sums, variance = tile_sums(planes[0], planes[-1][layout.slices], layout, shears, towards.unit)
+    residuals = [_without_rounding(detrended(face, order)[0], face) for face in heights]
+    sums, variance = tile_sums(residuals[0], residuals[-1][layout.slices], layout, shears, towards.unit)
     if not np.isfinite(variance).all():
         raise missing_heights(WHERE, crack, towards, float(shears[~np.isfinite(variance)][0]))
     return sums, variance
@@ -221,11 +221,11 @@ def tile_sums(lower: Array, upper: Array, block: Block, shears: Array, unit: Pai
     return TileSums(product, squares, upper_squares), variance
 
 
-def _tile_sum(plane: Array, side: int) -> Array:
+def _tile_sum(values: Array, side: int) -> Array:
     for axis in (0, 1):
-        starts = np.arange(side) * plane.shape[axis] // side
-        plane = np.add.reduceat(plane, starts, axis=axis)
-    return plane.ravel()
+        starts = np.arange(side) * values.shape[axis] // side
+        values = np.add.reduceat(values, starts, axis=axis)
+    return values.ravel()
 
 
 def estimate_length(

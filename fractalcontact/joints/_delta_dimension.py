@@ -110,10 +110,10 @@ def delta_dimension(
     """
     towards, shears = read_direction(direction), float_array(shear)
     windows = _windows(window, crack.layout.spacing[1], min(crack.block))
-    planes = delta_surface(crack, shears, towards.azimuth)
-    heights = np.asarray(planes.std(("y", "x")).values)
+    deltas = delta_surface(crack, shears, towards.azimuth)
+    heights = np.asarray(deltas.std(("y", "x")).values)
     flat = heights <= rounding_of(np.asarray(crack.lower.values)[crack.layout.slices])
-    rows = [_dimensions(planes.isel(shear=i), windows, bool(flat[i])) for i in range(shears.size)]
+    rows = [_dimensions(deltas.isel(shear=i), windows, bool(flat[i])) for i in range(shears.size)]
     covering, variogram, spectrum = np.transpose(rows)
     result = xr.Dataset(
         {
@@ -144,16 +144,16 @@ def _windows(
     return (float(ends[0]), float(ends[1])), (float(ends[0]), float(ends[1]))
 
 
-def _dimensions(plane: xr.DataArray, windows: tuple[Window, Window], flat: bool) -> tuple[float, ...]:
+def _dimensions(delta: xr.DataArray, windows: tuple[Window, Window], flat: bool) -> tuple[float, ...]:
     """Return the dimensions by area, variogram and spectrum."""
     from fractalcontact import dimensions
 
-    area = dimensions.covering(plane)
+    area = dimensions.covering(delta)
     by_area = 2.0 - _slope(area["cube_size"], area["covering_area"], windows[0])
     if flat:
         return 2.0, math.nan, math.nan
-    increments = dimensions.variogram(plane, max_lag=windows[0][1])
-    density = dimensions.spectrum(plane)
+    increments = dimensions.variogram(delta, max_lag=windows[0][1])
+    density = dimensions.spectrum(delta)
     by_lag = 3.0 - _slope(increments["lag"], increments["variogram"], windows[0]) / 2
     by_wavelength = 4.0 - _slope(density["wavelength"], density["power_spectral_density"], windows[1]) / 2
     return by_area, by_lag, by_wavelength

@@ -78,17 +78,17 @@ def delta_surface(
     [0.0, -0.4]
     """
     directions, shears = read_directions(direction), float_array(shear)
-    planes = np.empty((len(directions), shears.size, *crack.layout.cells))
+    heights = np.empty((len(directions), shears.size, *crack.layout.cells))
     for i, towards in enumerate(directions):
         for j, v in enumerate(shears):
-            planes[i, j] = delta_heights(crack, float(v), towards, WHERE)
+            heights[i, j] = delta_heights(crack, float(v), towards, WHERE)
     coords: dict[str, Any] = {
         "shear": ("shear", shears),
         **block_coords(crack),
         **direction_coords(directions),
     }
     coords["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
-    result = xr.DataArray(planes, dims=("direction", "shear", "y", "x"), coords=coords, name="height")
+    result = xr.DataArray(heights, dims=("direction", "shear", "y", "x"), coords=coords, name="height")
     if np.ndim(shear) == 0:
         result = result.isel(shear=0)
     if is_single(direction):
@@ -100,10 +100,10 @@ def delta_heights(crack: Crack, shear: float, direction: Direction, where: str) 
     """Return the heights of one delta-surface, shape (y, x) of the block."""
     lower, upper = crack.faces()
     under = heights_under(lower, crack.layout, crack.layout.shift(shear, direction.unit))
-    plane = np.asarray(under - upper)
-    if not np.isfinite(plane).all():
+    heights = np.asarray(under - upper)
+    if not np.isfinite(heights).all():
         raise missing_heights(where, crack, direction, shear)
-    return plane
+    return heights
 
 
 def missing_heights(where: str, crack: Crack, direction: Direction, shear: float) -> InvalidInput:

@@ -18,8 +18,8 @@ from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._sheared_contact import (
     BULK,
+    CONTACT_OPTIONS,
     PRESSING_BYTES,
-    SOLVER,
     Pressing,
     check_pressed,
     check_pressing,
@@ -37,7 +37,8 @@ def _check(problems: Problems) -> None:
     given = problems.given
     check_sliding(problems)
     if given.normal_force is None:
-        check_unpressed(problems, dilatancy, ("normal_stiffness", "pressed", "bulk", "keep", *SOLVER))
+        unused = ("normal_stiffness", "pressed", "bulk", "keep", *CONTACT_OPTIONS)
+        check_unpressed(problems, dilatancy, unused)
         return
     check_pressed(problems)
     one_of = given.normal_stiffness is None or given.pressed is None

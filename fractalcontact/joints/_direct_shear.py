@@ -185,9 +185,9 @@ def direct_shear(
     result = _dataset(crack, tests, legs, pressures, shear_stiffness, min(length, float(np.ptp(legs[0]))))
     for name, index in zip(MAPS, (0, 1), strict=True):
         if name in names:
-            planes = np.stack([test.joint.faces()[index].values for test in tests])
+            faces = np.stack([test.joint.faces()[index].values for test in tests])
             coords = {dim: crack.lower.coords[dim].variable for dim in ("y", "x")}
-            result[name] = ("nominal_pressure", "y", "x"), planes
+            result[name] = ("nominal_pressure", "y", "x"), faces
             result = result.assign_coords(coords)
     residual = max(test.joint.residual for test in tests)
     _warn([test.joint for test in tests])

@@ -116,7 +116,7 @@ class Facets(NamedTuple):
     rise_y: Array
     rise_x: Array
     area: Array
-    plane: tuple[float, float]
+    mean_slopes: tuple[float, float]
     rounding: float
 
 
@@ -157,7 +157,7 @@ def _facing(
     tan theta* = -tan theta cos alpha, with the dip theta of the facet from the mean plane and the angle alpha
     between the shear and the direction in which it dips (Grasselli et al. 2002): the rise along the shear.
     """
-    along = unit[0] * facets.plane[0] + unit[1] * facets.plane[1]  # slope of the mean plane along the shear
+    along = unit[0] * facets.mean_slopes[0] + unit[1] * facets.mean_slopes[1]  # of the mean plane
     unit_y, unit_x = (each / math.sqrt(1.0 + along**2) for each in unit)
     parts = [slice(start, start + size) for start in range(0, facets.area.size, size)]
 

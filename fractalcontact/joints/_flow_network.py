@@ -169,8 +169,8 @@ def _clusters(network: Network, chosen: Array | slice = slice(None)) -> Array:
 def spanning_cells(network: Network, axis: int, ends: Sequence[Array]) -> Array:
     """Return which cells belong to an open cluster that reaches from end to end along an axis."""
     labels = _clusters(network)
-    plane = labels.reshape(network.shape)
-    first, last = (plane[line_of(axis, place)][end > 0] for place, end in zip((0, -1), ends, strict=True))
+    cells = labels.reshape(network.shape)
+    first, last = (cells[line_of(axis, place)][end > 0] for place, end in zip((0, -1), ends, strict=True))
     return np.isin(labels, np.intersect1d(first, last))
 
 
@@ -248,8 +248,8 @@ def cell_flows(network: Network, pressure: Array, inside: Array, axis: int, ends
         part = half * (network.axis == each)
         through = np.bincount(network.i, part, p.size) + np.bincount(network.j, part, p.size)
         flows[each] = through.reshape(network.shape)
-    plane = inside.reshape(network.shape)
+    crossed = inside.reshape(network.shape)
     for place, end, held in zip((0, -1), ends, (1.0, 0.0), strict=False):
         line = line_of(axis, place)
-        flows[axis][line] += 0.5 * end * np.abs(held - pressure[line]) * plane[line]
+        flows[axis][line] += 0.5 * end * np.abs(held - pressure[line]) * crossed[line]
     return flows

@@ -290,17 +290,17 @@ def coarse_shift(lower: Array, upper: Array, offset: Pair, width: float, overlap
     from skimage.registration import phase_cross_correlation
 
     shape = tuple(max(a, b) for a, b in zip(lower.shape, upper.shape, strict=True))
-    planes, masks = [], []
+    reliefs, masks = [], []
     for face in (lower, upper):
         observed = np.zeros(shape, bool)
-        plane = np.zeros(shape)
+        relief = np.zeros(shape)
         inside = tuple(slice(n) for n in face.shape)
         observed[inside] = np.isfinite(face)
-        plane[inside] = np.where(np.isfinite(face), face - smooth(face, width), 0.0)
-        planes.append(plane / (math.sqrt(float(np.mean(plane**2))) or 1.0))
+        relief[inside] = np.where(np.isfinite(face), face - smooth(face, width), 0.0)
+        reliefs.append(relief / (math.sqrt(float(np.mean(relief**2))) or 1.0))
         masks.append(observed)
     correlation = phase_cross_correlation(
-        *planes, reference_mask=masks[0], moving_mask=masks[1], overlap_ratio=overlap
+        *reliefs, reference_mask=masks[0], moving_mask=masks[1], overlap_ratio=overlap
     )
     shift = np.asarray(correlation[0], dtype=float)
     # the correlation counts from the corners of the arrays

@@ -159,13 +159,13 @@ def roughness_coefficient(
     chosen_direction = _direction_or_default(direction, surface)
     directions = read_directions(chosen_direction)
     interval = _lag_or_default(lag, regression)
-    plane = detrended(np.asarray(surface.values, dtype=np.float64), 1)[0]
+    heights = detrended(np.asarray(surface.values, dtype=np.float64), 1)[0]
     count = len(directions)
     slopes, lags, intervals = np.empty(count), np.empty(count), np.empty(count)
     coefficient, limits = np.empty(count), np.full((2, count), np.nan)
     with Problems(WHERE) as problems:
         for i, towards in enumerate(directions):
-            lines = _profile_slopes(plane, grid.spacing, towards, interval)
+            lines = _profile_slopes(heights, grid.spacing, towards, interval)
             slopes[i], lags[i] = lines.slope, lines.lag
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / lines.lag)))
             intervals[i], coefficient[i] = fitted.interval, _coefficient(fitted, lines.slope)
@@ -247,17 +247,19 @@ class ProfileSlopes(NamedTuple):
     lag: float
 
 
-def _profile_slopes(plane: Array, spacing: Sequence[float], towards: Direction, lag: float) -> ProfileSlopes:
+def _profile_slopes(
+    heights: Array, spacing: Sequence[float], towards: Direction, lag: float
+) -> ProfileSlopes:
     """Return the slopes between heights one lag apart.
 
     The profiles are the lines of cells along the lag. Those with less than half of the readings of the
     longest are left out of `of_profiles`: a short one scatters more.
     """
     cells = _lag_cells(spacing, towards, lag)
-    ahead = tuple(slice(max(n, 0), size + min(n, 0)) for n, size in zip(cells, plane.shape, strict=True))
-    behind = tuple(slice(max(-n, 0), size + min(-n, 0)) for n, size in zip(cells, plane.shape, strict=True))
+    ahead = tuple(slice(max(n, 0), size + min(n, 0)) for n, size in zip(cells, heights.shape, strict=True))
+    behind = tuple(slice(max(-n, 0), size + min(-n, 0)) for n, size in zip(cells, heights.shape, strict=True))
     length = math.hypot(*(n * step for n, step in zip(cells, spacing, strict=True)))
-    squares = (plane[ahead] - plane[behind]) ** 2
+    squares = (heights[ahead] - heights[behind]) ** 2
     observed = np.isfinite(squares)
     if not observed.any():
         return ProfileSlopes(math.nan, np.empty(0), length)

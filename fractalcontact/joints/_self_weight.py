@@ -30,7 +30,7 @@ from fractalcontact.joints._sheared_contact import (
 )
 
 WHERE = "fractalcontact.joints.self_weight"
-OF_SOLVER = ("influence", "hardness", "tolerance")
+USED_OPTIONS = ("influence", "hardness", "tolerance")
 MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
 RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and no load closes it"
 NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
@@ -48,7 +48,7 @@ def _check(problems: Problems) -> None:
         if weight and isinstance(given.crack, Crack):
             force = (float(given.unit_weight) * sizes * given.crack.nominal_area).tolist()
     if _is_rigid(given.crack):
-        check_unpressed(problems, self_weight, OF_SOLVER)
+        check_unpressed(problems, self_weight, USED_OPTIONS)
     else:
         check_pressing(problems, normal_force=force)
 

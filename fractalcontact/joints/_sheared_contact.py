@@ -48,7 +48,7 @@ BULK = {
     ),
 }
 LOADS = ("closure", "normal_force", "nominal_pressure")
-SOLVER = ("influence", "disc_radius", "hardness", "tolerance", "method")
+CONTACT_OPTIONS = ("influence", "disc_radius", "hardness", "tolerance", "method")
 # bytes of a cell: the solver of a free body with the steps before (188), delta-surface and flat block
 PRESSING_BYTES = 228.0
 
@@ -77,12 +77,12 @@ class Pressing:
         *,
         bulk: str = "flat_block",
         keep: Any = (),
-        **solver: Any,
+        **contact_options: Any,
     ) -> Pressing:
-        """Return it from arguments that passed `check_pressing`; `solver`: some of the options `SOLVER`."""
+        """Return it from arguments that passed `check_pressing`, with some of `CONTACT_OPTIONS`."""
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-        options = ContactOptions(_boundary(crack), **solver)
+        options = ContactOptions(_boundary(crack), **contact_options)
         return cls(crack, where, LoadPath.among(loads), options, bulk, word_tuple(keep))
 
     @property
@@ -318,7 +318,7 @@ def check_pressed(problems: Problems) -> None:
         return
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
     entry = provenance_of(given.pressed) if isinstance(given.pressed, xr.Dataset) else {}
-    others = differing(entry, {name: getattr(given, name) for name in ("crack", "bulk", *SOLVER)})
+    others = differing(entry, {name: getattr(given, name) for name in ("crack", "bulk", *CONTACT_OPTIONS)})
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
     if problems.require(is_closure, "pressed", expected):
         problems.require(not others, "pressed", expected, f"one with another {', '.join(others)}")

@@ -131,8 +131,8 @@ def transmissivity(
     order = nested_dissection(grid.shape, wraps)
     flows = [
         flow
-        for plane in values.reshape(-1, *values.shape[-2:])
-        for flow in plane_flows(plane, ratio, wraps, order, [AXES.index(name) for name in axes])
+        for opening in values.reshape(-1, *values.shape[-2:])
+        for flow in gap_flows(opening, ratio, wraps, order, [AXES.index(name) for name in axes])
     ]
     shape = (*values.shape[:-2], len(axes))
     conductivity = np.reshape([flow.conductivity for flow in flows], shape)
@@ -189,7 +189,7 @@ class Flow:
     flux: Array
 
 
-def plane_flows(
+def gap_flows(
     gap: Array, ratio: float, wraps: tuple[bool, bool], order: Array, axes: Sequence[int]
 ) -> list[Flow]:
     """Return the flow of a plane along axes (0 for y).

@@ -203,8 +203,8 @@ def uplift(
         gap = gap.isel(step=0).drop_vars(along)
     else:
         soft = None if normal_stiffness is None else (low / normal_stiffness, drop / normal_stiffness)
-        planes = np.asarray(gap.values, dtype=np.float64).reshape(-1, *gap.shape[-2:])
-        states = [_opened(plane, flow, soft) for plane in planes]
+        gaps = np.asarray(gap.values, dtype=np.float64).reshape(-1, *gap.shape[-2:])
+        states = [_opened(opening, flow, soft) for opening in gaps]
     leading = tuple(str(dim) for dim in gap.dims[:-2])
     pressure = np.reshape([low + drop * state.pressure for state in states], gap.shape)
     knots = _diagrams(flow, (upstream_pressure, low), drain_share)
@@ -423,13 +423,13 @@ def _path_stresses(gap: xr.DataArray) -> Array:
 def _on_path(gap: xr.DataArray, flow: HeldFlow, total: float, water: tuple[float, float]) -> list[State]:
     """Return the state of every gap, dims (..., step, y, x), at which its path balances the total stress."""
     steps, stresses = gap.sizes["step"], _path_stresses(gap)
-    planes = np.asarray(gap.values, dtype=np.float64).reshape(-1, steps, *gap.shape[-2:])
-    pairs = zip(planes, stresses.reshape(-1, steps), strict=True)
+    paths = np.asarray(gap.values, dtype=np.float64).reshape(-1, steps, *gap.shape[-2:])
+    pairs = zip(paths, stresses.reshape(-1, steps), strict=True)
     return [_balanced(path, stress, flow, total, water) for path, stress in pairs]
 
 
 def _balanced(
-    planes: Array,
+    gaps: Array,
     stresses: Array,
     flow: HeldFlow,
     total: float,
@@ -451,7 +451,7 @@ def _balanced(
         step = min(int(place), len(stresses) - 2)
         share, (low, high) = place - step, stresses[step : step + 2]
         stress = low * (high / low) ** share if low > 0 else share * high
-        gap = planes[step] + share * (planes[step + 1] - planes[step])
+        gap = gaps[step] + share * (gaps[step + 1] - gaps[step])
         p, residual = flow.pressure(gap)
         uplift = float(np.nan_to_num(water[0] + water[1] * p).mean())
         error = (stress + uplift) / total - 1.0

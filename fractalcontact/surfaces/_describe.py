@@ -16,7 +16,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import RANK, scaled_slopes, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, labelled_rows
+from fractalcontact.surfaces._height_stack import check_stack, labelled_rows
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
 
@@ -37,7 +37,7 @@ def _check(problems: Problems) -> None:
     if has_blocks(surface):
         problems.surface("surface", finite=False, smallest=3, leading=True, profile=True)
     else:
-        check_planes(problems, smallest=3)
+        check_stack(problems, smallest=3)
     if isinstance(surface, xr.DataArray):
         check_leading(surface, _result_names(len(core_dims(surface))), problems)
 
@@ -107,8 +107,8 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
         places = np.ndindex(*surface.shape[: surface.ndim - len(grid.shape)])
         rows = [_statistics_in_blocks(surface[place], grid.spacing) for place in places]
     else:
-        planes = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
-        rows = [_statistics(plane, grid.spacing, grid.periodic) for plane in planes]
+        stack = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
+        rows = [_statistics(heights, grid.spacing, grid.periodic) for heights in stack]
     result = labelled_rows(surface, rows)
     by_modes = all(grid.periodic) and not has_blocks(surface) and not result["missing_points"].any()
     result.attrs["derivatives"] = "modes" if by_modes else "differences"
@@ -312,13 +312,13 @@ def _neighbours(
 
     They are in scaled heights and steps; `ratio` is the unit of height over that of length.
     """
-    plane, spacing = np.atleast_2d(values), (1.0, *steps)[-2:]
+    heights, spacing = np.atleast_2d(values), (1.0, *steps)[-2:]
     wraps = [int(wrap) for wrap in (False, *periodic)[-2:]]
-    onward = np.pad(plane, [(0, wrap) for wrap in wraps], mode="wrap")  # each point and the next
+    onward = np.pad(heights, [(0, wrap) for wrap in wraps], mode="wrap")  # each point and the next
     slopes = [np.diff(onward, axis=axis) / step for axis, step in enumerate(spacing)]
-    own = slopes[0][:, : plane.shape[1]], slopes[1][: plane.shape[0]]
+    own = slopes[0][:, : heights.shape[1]], slopes[1][: heights.shape[0]]
     squares = [_observed_sum(slope**2) for slope in own[2 - values.ndim :]]
-    around = np.pad(plane, [(wrap, wrap) for wrap in wraps], mode="wrap")
+    around = np.pad(heights, [(wrap, wrap) for wrap in wraps], mode="wrap")
     bends = [np.diff(around, 2, axis=axis) / step**2 for axis, step in enumerate(spacing)]
     laplacian = bends[1] if values.ndim == 1 else bends[0][:, 1:-1] + bends[1][1:-1]
     laplacian_square = _observed_sum(laplacian**2)

@@ -10,7 +10,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.surfaces._height_planes import with_heights
+from fractalcontact.surfaces._height_stack import with_heights
 
 ROUSSEEUW = "Rousseeuw and Croux, Journal of the American Statistical Association 88 (1993) 1273-1283"
 

@@ -23,7 +23,7 @@ STEIN = (
 
 
 def _check(problems: Problems) -> None:
-    _new_surface.check_plane(problems)
+    _new_surface.check_axes(problems)
     problems.number("hurst", at_least=0.01, at_most=0.99)
     _new_surface.check_length(problems, "rms_increment")
     _new_surface.check_length(problems, "lag", optional=True)
@@ -92,7 +92,7 @@ def fbm(
     >>> print(f"{float((increment**2).mean() ** 0.5):.0e} m")
     1e-06 m
     """
-    (ny, nx), (dy, dx) = _plane(shape, spacing)
+    (ny, nx), (dy, dx) = _two_axes(shape, spacing)
     sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
     torus = torus_shape((ny, nx), (dy, dx), float(hurst))
     # of a long surface it has far more points than `memory` counts; its quadrant is transformed
@@ -121,7 +121,7 @@ def fbm(
     return _new_surface.draw_ensemble(draw_heights, steps, members=members, rng=rng)
 
 
-def _plane(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, float]]:
+def _two_axes(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, float]]:
     """Return (ny, nx) and (dy, dx); a profile has ny = 1 and dy = 1."""
     sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
     (ny, nx), (dy, dx) = (1, *sizes)[-2:], (1.0, *steps)[-2:]

@@ -14,22 +14,22 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
+from fractalcontact.surfaces._height_stack import check_stack, height_stack, with_heights
 
 BRIGGS = "Briggs, Machine contouring using minimum curvature, Geophysics 39 (1974) 39-48"
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    valid = check_planes(problems)
+    valid = check_stack(problems)
     if not (problems.number("at_most", at_least=0, at_most=1) and valid):
         return
-    observed = ~np.isnan(height_planes(given.surface))
+    observed = ~np.isnan(height_stack(given.surface))
     size = observed[0].size
-    most = max(size - int(np.count_nonzero(plane)) for plane in observed)
+    most = max(size - int(np.count_nonzero(each)) for each in observed)
     expected = f"at most {100 * float(given.at_most):g} % missing points (see `at_most`)"
     if problems.require(most <= given.at_most * size, "surface", expected, f"{most} of {size} NaN"):
-        spans = all(_spans_plane(plane) for plane in observed if not plane.all())
+        spans = all(_spans_plane(each) for each in observed if not each.all())
         problems.require(spans, "surface", "observed points that span a plane", "too few of them")
 
 
@@ -87,10 +87,10 @@ def fill(surface: xr.DataArray, *, at_most: float = 0.25) -> xr.DataArray:  # no
     (2, 0.005)
     """
     grid = read_grid(surface, core_dims(surface))
-    planes = height_planes(surface)
-    filled = np.stack([_filled(plane, grid.spacing, grid.periodic) for plane in planes])
+    stack = height_stack(surface)
+    filled = np.stack([_filled(heights, grid.spacing, grid.periodic) for heights in stack])
     leading = surface.dims[: surface.ndim - len(grid.shape)]
-    missing = np.count_nonzero(np.isnan(planes), axis=tuple(range(1, planes.ndim))).astype(np.int64)
+    missing = np.count_nonzero(np.isnan(stack), axis=tuple(range(1, stack.ndim))).astype(np.int64)
     missing = missing.reshape(surface.shape[: len(leading)])
     result = with_heights(surface, filled).assign_coords(filled_points=(leading, missing))
     result.attrs = {"filled_points": missing}

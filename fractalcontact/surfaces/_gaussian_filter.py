@@ -12,12 +12,12 @@ from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
+from fractalcontact.surfaces._height_stack import check_stack, height_stack, with_heights
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    is_valid = check_planes(problems)
+    is_valid = check_stack(problems)
     problems.choice("keep", among=("long", "short"))
     if problems.number("cutoff", above=0) and is_valid:
         grid = read_grid(given.surface, core_dims(given.surface))
@@ -78,9 +78,9 @@ def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long")
     5.000e-07 m
     """
     grid = read_grid(surface, core_dims(surface))
-    planes = height_planes(surface)
-    long = np.stack([weighted_mean(plane, float(cutoff), grid.spacing, grid.periodic) for plane in planes])
-    return with_heights(surface, long if keep == "long" else planes - long)
+    stack = height_stack(surface)
+    long = np.stack([weighted_mean(each, float(cutoff), grid.spacing, grid.periodic) for each in stack])
+    return with_heights(surface, long if keep == "long" else stack - long)
 
 
 def weighted_mean(heights: Array, cutoff: float, spacing: Sequence[float], periodic: Sequence[bool]) -> Array:

@@ -9,13 +9,13 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.polynomial import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes, with_heights
+from fractalcontact.surfaces._height_stack import check_stack, height_stack, with_heights
 
 POLYNOMIALS = ("mean", "plane", "quadric")
 
 
 def _check(problems: Problems) -> None:
-    check_planes(problems)
+    check_stack(problems)
     problems.integer("order", at_least=0, at_most=2)
 
 
@@ -56,8 +56,8 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
     >>> float(abs(levelled).max()) < 1e-15
     True
     """
-    planes = height_planes(surface)
-    fits = [detrended(plane, int(order)) if np.isfinite(plane).any() else (plane, False) for plane in planes]
+    stack = height_stack(surface)
+    fits = [detrended(each, int(order)) if np.isfinite(each).any() else (each, False) for each in stack]
     failed = sum(not determined for _, determined in fits)
     if failed:
         where = "" if len(fits) == 1 else f" ({failed} of {len(fits)} planes)"

@@ -25,7 +25,7 @@ Points = Sequence[tuple[float, float]]
 
 
 def _check(problems: Problems) -> None:
-    _new_surface.check_plane(problems, profile=False)
+    _new_surface.check_axes(problems, profile=False)
     problems.number("hurst", at_least=0.01, at_most=0.99)
     _new_surface.check_length(problems, "rms_increment")
     _new_surface.check_ensemble(problems)

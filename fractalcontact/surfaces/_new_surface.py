@@ -48,7 +48,7 @@ def check_spacing(problems: Problems, axes: int | None = None, spacing: Any = GI
     return problems.require(np.size(spacing) in (1, axes or 2), "spacing", expected, spacing)
 
 
-def check_plane(problems: Problems, *, profile: bool = True) -> bool:
+def check_axes(problems: Problems, *, profile: bool = True) -> bool:
     """Check shape and spacing of new surfaces together."""
     shape = problems.given.shape
     valid_shape = check_shape(problems, shape, profile=profile)
@@ -68,7 +68,7 @@ def axis_spacing(spacing: Any, axes: int) -> tuple[float, ...]:
 
 
 def sizes_and_steps(shape: Any, spacing: Any) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Return shape and spacing that passed `check_plane`, for each axis, y first."""
+    """Return shape and spacing that passed `check_axes`, for each axis, y first."""
     sizes = axis_sizes(shape)
     return sizes, axis_spacing(spacing, len(sizes))
 
@@ -138,8 +138,8 @@ def draw_ensemble(
         first, entries = next(drawn)
         heights = np.empty((members, *first.shape))
         heights[0] = first
-        for number, (plane, _) in enumerate(drawn, 1):
-            heights[number] = plane
+        for number, (drawn_heights, _) in enumerate(drawn, 1):
+            heights[number] = drawn_heights
     leading = None if members is None else {"member": None}
     surface = surface_array(heights, spacing, (periodic,) * len(spacing), leading)
     surface.attrs = {"random": record, **entries}

@@ -32,7 +32,7 @@ EDGE = 1e-9  # relative distance from a cut-off within which a mode counts as in
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    valid_plane = _new_surface.check_plane(problems)
+    valid_plane = _new_surface.check_axes(problems)
     axes = np.size(given.shape) if valid_plane else 2
     valid_hurst = problems.numbers("hurst", at_least=0.01, at_most=1.0) and problems.require(
         np.size(given.hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else "")

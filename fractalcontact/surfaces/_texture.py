@@ -15,7 +15,7 @@ from fractalcontact.base.polynomial import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import lagged_products
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_planes import check_planes, height_planes, labelled_rows
+from fractalcontact.surfaces._height_stack import check_stack, height_stack, labelled_rows
 
 DECAY = 0.2  # of the autocorrelation at the lengths (ISO 25178-2, default of Sal and Str)
 
@@ -32,7 +32,7 @@ _CORE = (
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    if check_planes(problems):
+    if check_stack(problems):
         check_leading(given.surface, (*_CORRELATION, *_CORE, "run_time"), problems)
 
 
@@ -92,8 +92,8 @@ def texture(surface: xr.DataArray) -> xr.Dataset:
     9.86e-05 m, 0.87
     """
     grid = read_grid(surface, core_dims(surface))
-    planes = height_planes(surface)
-    rows = [_correlation(plane, grid.spacing, grid.periodic) + _core(plane) for plane in planes]
+    stack = height_stack(surface)
+    rows = [_correlation(heights, grid.spacing, grid.periodic) + _core(heights) for heights in stack]
     names = (*_CORRELATION, *_CORE)
     result = labelled_rows(surface, [dict(zip(names, row, strict=True)) for row in rows])
     for name, variable in result.data_vars.items():
@@ -120,11 +120,11 @@ def _correlation(
     rays: int = 360,  # over the half circle; 1440 change lengths by 2e-5 and the aspect ratio by 6e-5
 ) -> list[float]:
     """Return the shortest distance at which the autocorrelation has fallen, and its ratio to the longest."""
-    plane = np.atleast_2d(heights)
-    observed = np.isfinite(plane)
-    if np.count_nonzero(observed) < _LEAST or np.ptp(plane[observed]) == 0.0:
+    rows = np.atleast_2d(heights)
+    observed = np.isfinite(rows)
+    if np.count_nonzero(observed) < _LEAST or np.ptp(rows[observed]) == 0.0:
         return [math.nan, math.nan]
-    values = shifted(plane)[0]
+    values = shifted(rows)[0]
     values = np.where(observed, values - values[observed].mean(), 0.0)
     steps = (spacing[-1] if heights.ndim == 1 else spacing[0], spacing[-1])
     acf, reach = _autocorrelation(values, observed, (False, *periodic)[-2:])

@@ -22,7 +22,7 @@ AUSLOOS = (
 
 
 def _check(problems: Problems) -> None:
-    _new_surface.check_plane(problems)
+    _new_surface.check_axes(problems)
     problems.number("hurst", above=0, below=1)
     _new_surface.check_length(problems, "rms_height")
     problems.number("ratio", above=1)

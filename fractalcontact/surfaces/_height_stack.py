@@ -13,7 +13,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
 
 
-def check_planes(problems: Problems, *, smallest: int = 2) -> bool:
+def check_stack(problems: Problems, *, smallest: int = 2) -> bool:
     """Check for planes or profiles of heights that may have gaps (NaN) but no infinite values."""
     if not problems.surface("surface", finite=False, smallest=smallest, leading=True, profile=True):
         return False
@@ -22,7 +22,7 @@ def check_planes(problems: Problems, *, smallest: int = 2) -> bool:
     return problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
 
 
-def height_planes(surface: xr.DataArray) -> Array:
+def height_stack(surface: xr.DataArray) -> Array:
     """Return a copy of the heights as float64, shape (planes, ny, nx) or (planes, nx)."""
     values = np.array(surface.values, dtype=np.float64)
     return values.reshape(-1, *values.shape[values.ndim - len(core_dims(surface)) :])
