@@ -58,6 +58,7 @@ class Elimination:
             residual=error,
             reason=reason if balance.rounds <= MAX_ROUNDS else "iteration_limit",
             work=float(np.sum(pressure * displacement)),
+            solver="elimination",
         )
 
 

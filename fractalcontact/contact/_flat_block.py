@@ -129,7 +129,7 @@ def flat_block(
     body: Body,
     *,
     target: float = 1e-14,  # spread of the displacement over its mean: what rounding leaves
-    max_iterations: int = 500,  # 11 to 17 are usual, 26 for 3 x 400 nodes
+    max_iterations: int = 500,  # 15 are usual; 113 for a spacing 1000 times the other one
 ) -> FlatBlock:
     """Solve K p = const, sum p = 1, by preconditioned conjugate gradients on the whole plane.
 
@@ -149,7 +149,7 @@ def flat_block(
         error = float(np.abs(g).max()) / closure
         if error < best[0]:
             best = (error, p, u)
-        if error <= target or error > 1e3 * best[0]:
+        if error <= target:
             break
         g -= mean_by_rows(g)
         z = preconditioner.apply_to_all(g)

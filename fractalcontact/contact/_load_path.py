@@ -177,7 +177,7 @@ def solve_path(
     path: ScaledPath,
     guess: Callable[[float], Array | None] | None = None,
     *,
-    force_tolerance: float = 1e-9,  # share of an imposed force that the pressures may miss
+    force_tolerance: float = 1e-9,  # the most in 656 steps on random surfaces was 5e-16: more is a failure
 ) -> Iterator[Step]:
     """Yield the steps of a path as they are solved.
 
@@ -185,15 +185,15 @@ def solve_path(
     or where it returns None, that is extrapolated from the steps before.
     """
     problem = Problem(path.body, path.gap, path.hardness / path.units.pressure)
-    solver: WindowSolver | Elimination | None = None
+    step_solver: WindowSolver | Elimination | None = None
     history = PlasticHistory()
     for value in path.values:
         start = perf_counter()
         control = scaled_control(path, value, history.first_touch)
         solution = closed_form(problem, control, path.tolerance)
         if solution is None:
-            solver = solver or make_solver(problem, path)
-            solution = solver.solve(control, None if guess is None else guess(value))
+            step_solver = step_solver or make_solver(problem, path)
+            solution = step_solver.solve(control, None if guess is None else guess(value))
         force = solution.force * path.units.force
         if path.control == "closure":
             closure, imposed = value, force
@@ -206,8 +206,8 @@ def solve_path(
         if step.new_indentation is not None:
             history = step.history_after
             problem = replace(problem, gap=path.gap + history.indentation - history.first_touch)
-            if solver is not None:  # only the fast method has a hardness, see `ContactOptions`
-                cast("WindowSolver", solver).set_gap(problem.gap)
+            if step_solver is not None:  # only the fast method has a hardness, see `ContactOptions`
+                cast("WindowSolver", step_solver).set_gap(problem.gap)
 
 
 def scaled_control(path: ScaledPath, value: float, first_touch: float) -> Control:
@@ -291,11 +291,14 @@ def press_punch(
 
     Its stiffness is that of the contact (Barber 2003): a node at the edge of a contact bears no pressure, so
     that nodes that come into contact add nothing to the force at first. Away from the base the gap is more
-    than the punch can close: its closure is at most that of `step`, whose stiffness grows with the load.
-    Yielded nodes are part of the base: the stiffness is that of unloading.
+    than the punch can close: its closure is at most that of `step`, whose stiffness grows with the load, and
+    a periodic body bulges by less than the range of heights, 1. Yielded nodes are part of the base: the
+    stiffness is that of unloading.
     """
     if not step.force > 0:
         return None
+    # 1.1 and 100 closures moved the stiffness by 3e-5, as the tolerance does; with .001 in place of 1 four of
+    # 656 punches came into full contact
     depth = 4 * step.solution.closure + 1.0
     path = replace(
         step.path,

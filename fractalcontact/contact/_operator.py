@@ -63,7 +63,7 @@ class PeriodicOperator:
         if self.latest is not None:
             return self.latest
         self.transforms += 0.5
-        return self.multiplier.plane(out)
+        return self.multiplier.from_modes(out)
 
 
 class HalfSpaceOperator:
@@ -74,7 +74,7 @@ class HalfSpaceOperator:
         self.padded = (padded_length(self.shape[0]), padded_length(self.shape[1]))
         self.symbol = convolution_symbol(table, self.padded).astype(dtype)
         self.transform = fft.PlaneTransform(self.padded)
-        self.is_small = self.padded[0] * self.padded[1] <= 4 * SMALL
+        self.is_small = self.padded[0] * self.padded[1] <= 4 * SMALL  # padded to twice the length
         self.modes: Any = None  # array of the last transform, for the next one
         self.planes: tuple[Array, Array] | None = None  # padded, of a small body
         self.latest: Array | None = None  # displacement that came with the work on a small plane
@@ -93,7 +93,7 @@ class HalfSpaceOperator:
         if self.is_small:
             return self.apply_at_once(pressure, out)
         self.filter_modes(pressure, NO_WORK)
-        return self.plane()
+        return self.from_modes()
 
     def apply_at_once(self, pressure: Array, out: Array | None) -> Array:
         """Return the displacement, from transforms of the whole padded plane: a call each."""
@@ -128,7 +128,7 @@ class HalfSpaceOperator:
         self.modes = modes = fft.rfft2_padded(pressure, self.padded, self.modes)
         in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, work)
 
-    def plane(self, out: Array | None = None) -> Array:
+    def from_modes(self, out: Array | None = None) -> Array:
         """Return the displacement with the present modes, which are used up."""
         modes, self.modes = self.modes, self.modes if self.transform.in_place else None
         return fft.irfft2_cropped(modes, self.padded, self.shape, out)
@@ -138,7 +138,7 @@ class HalfSpaceOperator:
         if self.latest is not None:
             return self.latest
         self.transforms += 0.5
-        return self.plane(out)
+        return self.from_modes(out)
 
 
 class PairSum:
@@ -200,7 +200,7 @@ class WavenumberMultiplier:
         if self.is_small:
             return self.apply_at_once(plane, factor, invert, mean, out)
         self.filter_modes(plane, factor, invert, mean, NO_WORK)
-        return self.plane(out)
+        return self.from_modes(out)
 
     def apply_at_once(
         self, plane: Array, factor: float, invert: bool, mean: float, out: Array | None
@@ -231,7 +231,7 @@ class WavenumberMultiplier:
         weights = (qy2, qx2, dtype(factor), invert, dtype(mean), work)
         in_bands(scale_modes, modes.shape[1], modes.size, fft.real_parts(modes), *weights)
 
-    def plane(self, out: Array | None = None) -> Array:
+    def from_modes(self, out: Array | None = None) -> Array:
         """Return the plane with the present modes, which are used up."""
         modes, self.modes = self.modes, self.modes if self.transform.in_place else None
         return self.transform.backward(modes, out)

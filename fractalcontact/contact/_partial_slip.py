@@ -166,7 +166,7 @@ def partial_slip(
     if sheared.method == "superposition":
         warn_lay("fractalcontact.contact.partial_slip: the contact", sheared.superposition_error)
     residual = float(np.fmax.reduce(result["residual"].values))
-    stated = {"method": sheared.method, **options.stated_on(grid)}
+    stated = {"method": sheared.method, **options.stated_on(grid), "solver": sheared.normal.solution.solver}
     return result.assign_attrs(stated, achieved_residual=residual)
 
 

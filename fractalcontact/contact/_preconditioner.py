@@ -58,7 +58,7 @@ class FreeSet:
 class Preconditioner(Protocol):
     """A preconditioner on a plane of `plane` nodes, in `bin_shape` bins of bin_rows x bin_columns nodes."""
 
-    plane: tuple[int, int]
+    plane_shape: tuple[int, int]
     bin_rows: int
     bin_columns: int
     bin_shape: tuple[int, int]
@@ -77,22 +77,15 @@ class ExtensionPreconditioner:
     """Extension, |q|/2, and the transpose of the extension, on the plane of a body."""
 
     def __init__(self, body: Body, dtype: Any, multiplier: WavenumberMultiplier | None = None) -> None:
-        self.bin_rows, self.bin_columns = (bin_edge(body, axis) for axis in (0, 1))
-        self.plane = body.shape
-        if not body.periodic:
-            self.plane = (
-                padded_plane(body.shape[0], self.bin_rows),
-                padded_plane(body.shape[1], self.bin_columns),
-            )
-        self.bin_shape = (-(-self.plane[0] // self.bin_rows), -(-self.plane[1] // self.bin_columns))
-        self.multiplier = multiplier or WavenumberMultiplier(self.plane, body.spacing)
+        (self.bin_rows, self.bin_columns), self.plane_shape, self.bin_shape = bin_layout(body)
+        self.multiplier = multiplier or WavenumberMultiplier(self.plane_shape, body.spacing)
         edge = (self.bin_rows * body.spacing[0], self.bin_columns * body.spacing[1])
         tables = kept_bin_tables if body.is_small else bin_tables
-        self.kernel, compliance = tables(self.bin_shape, edge, np.dtype(dtype).char)
+        self.poisson_kernel, compliance = tables(self.bin_shape, edge, np.dtype(dtype).char)
         self.compliance = compliance if body.periodic else None
         self.bins = fft.PlaneTransform(self.bin_shape)
         self.self_compliance = float(np.sqrt(body.spacing[0] * body.spacing[1])) / 2
-        extent = np.sqrt(self.plane[0] * body.spacing[0] * self.plane[1] * body.spacing[1])
+        extent = np.sqrt(self.plane_shape[0] * body.spacing[0] * self.plane_shape[1] * body.spacing[1])
         # that of a flat block under a rigid flat; a periodic body has no stiffness for its mean
         self.mean_stiffness = 1.0 / float(extent)
         self.dtype = dtype
@@ -101,7 +94,7 @@ class ExtensionPreconditioner:
     def smooth(self, bins: Array) -> Array:
         """Apply the Poisson kernel G to the bins."""
         modes = self.bins.forward(bins)
-        modes *= self.kernel
+        modes *= self.poisson_kernel
         return self.bins.backward(modes)
 
     def apply(self, x: Array, free_set: FreeSet) -> tuple[Array, Array]:
@@ -120,7 +113,7 @@ class ExtensionPreconditioner:
             free_set.weight = weight
         extension = self.smooth(free_set.bin_sums)
         extension *= weight
-        size = self.plane[0] * self.plane[1]
+        size = self.plane_shape[0] * self.plane_shape[1]
         grid = (self.bin_rows, self.bin_columns, free_set.mask)
         in_bands(_kernels.fill_outside, self.bin_shape[0], size, *grid, extension, x)
         pressure = self.multiplier.apply(x, 0.5, invert=False, mean=self.mean_stiffness, out=x)
@@ -141,16 +134,16 @@ class ExtensionPreconditioner:
         modes *= self.compliance
         displacement = self.bins.backward(modes) / (self.bin_rows * self.bin_columns)
         count = float(counts.sum())
-        size = self.plane[0] * self.plane[1]
+        size = self.plane_shape[0] * self.plane_shape[1]
         own = self.self_compliance * count * (1.0 - count / size)
         return float(np.sum(np.sum(counts * displacement, axis=1), dtype=np.float64)) + own
 
     def apply_to_all(self, gap: Array) -> Array:
         """Return the pressure for a gap on a body whose nodes are all free."""
         ny, nx = gap.shape
-        free_set = FreeSet.empty(self.plane, self.bin_shape, self.dtype)
+        free_set = FreeSet.empty(self.plane_shape, self.bin_shape, self.dtype)
         free_set.mask[:ny, :nx] = True
-        x = np.zeros(self.plane, dtype=self.dtype)
+        x = np.zeros(self.plane_shape, dtype=self.dtype)
         x[:ny, :nx] = gap
         shape = (self.bin_shape[0], self.bin_rows, self.bin_shape[1], self.bin_columns)
         padded = np.zeros((shape[0] * shape[1], shape[2] * shape[3]), dtype=self.dtype)
@@ -168,7 +161,7 @@ class NodePreconditioner:
 
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.pairs = PairSum(table, iy, ix)
-        self.plane = (1, int(iy.size))
+        self.plane_shape = (1, int(iy.size))
         self.bin_rows, self.bin_columns, self.bin_shape = 1, int(iy.size), (1, 1)
         self.transforms = 0
 
@@ -187,16 +180,16 @@ def bin_tables(bin_shape: tuple[int, int], edge: tuple[float, float], dtype: str
         fft.wavenumbers(bin_shape[0], edge[0])[:, None],
         fft.wavenumbers(bin_shape[1], edge[1], real=True)[None, :],
     )
-    kernel = np.exp(-DECAY * np.sqrt(edge[0] * edge[1]) * q).astype(dtype)
+    poisson_kernel = np.exp(-DECAY * np.sqrt(edge[0] * edge[1]) * q).astype(dtype)
     q[0, 0] = np.inf
-    return kernel, (2.0 / q).astype(dtype)
+    return poisson_kernel, (2.0 / q).astype(dtype)
 
 
 kept_bin_tables = lru_cache(maxsize=32)(bin_tables)
 
 
 def stiffness_table(body: Body) -> Array:
-    """Return the kernel of |q|/2 in space, at offsets (i, j) up to the shape of the body."""
+    """Return the coefficients of |q|/2 in space, at offsets (i, j) up to the shape of the body."""
     ny, nx = body.shape
     plane = (2 * ny, 2 * nx)
     impulse = np.zeros(plane)
@@ -204,6 +197,15 @@ def stiffness_table(body: Body) -> Array:
     extent = float(np.sqrt(ny * body.spacing[0] * nx * body.spacing[1]))
     waves = WavenumberMultiplier(plane, body.spacing)
     return np.ascontiguousarray(waves.apply(impulse, 0.5, invert=False, mean=1.0 / extent)[:ny, :nx])
+
+
+def bin_layout(body: Body) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+    """Return the nodes along the edges of a bin, the nodes of the plane in bins, and the number of bins."""
+    edges = bin_edge(body, 0), bin_edge(body, 1)
+    ny, nx = body.shape
+    if not body.periodic:
+        ny, nx = padded_plane(ny, edges[0]), padded_plane(nx, edges[1])
+    return edges, (ny, nx), (-(-ny // edges[0]), -(-nx // edges[1]))
 
 
 def bin_edge(

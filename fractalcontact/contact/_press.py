@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -166,7 +167,9 @@ def press(
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     residual = float(np.fmax.reduce(result.variables["residual"].values, axis=None))
-    stated = {"references": options.references(grid), **options.stated_on(grid)}
+    steps = Counter(name for plane in planes for name in plane.solvers)
+    solvers = ", ".join(f"{name} ({number} steps)" for name, number in steps.items())
+    stated = {"references": options.references(grid), **options.stated_on(grid), "solver": solvers}
     return result.assign_attrs(stated, achieved_residual=residual)
 
 

@@ -119,6 +119,7 @@ class Solution:
     residual: float = 0.0
     reason: str = ""  # why the solution stopped, a key of `STOP_REASONS`
     work: float = 0.0  # sum of pressure times displacement: twice the elastic energy
+    solver: str = "closed_form"  # or "elimination", or one of the three of `_window_solver`
 
 
 @lru_cache(maxsize=16)

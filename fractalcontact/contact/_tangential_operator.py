@@ -19,7 +19,7 @@ from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.threads import in_bands
 from fractalcontact.contact._operator import convolution_symbol, padded_length
-from fractalcontact.contact._preconditioner import DECAY, FADE, bin_edge, padded_plane
+from fractalcontact.contact._preconditioner import DECAY, FADE, bin_layout
 from fractalcontact.contact._scaled_problem import Body
 
 
@@ -200,25 +200,18 @@ class TangentialPreconditioner:
 
     def __init__(self, operator: TangentialOperator, direction: Array, compliance: Array) -> None:
         body, self.operator = operator.body, operator
-        self.edges = (bin_edge(body, 0), bin_edge(body, 1))
-        self.plane = body.shape
-        if not body.periodic:
-            self.plane = (
-                padded_plane(body.shape[0], self.edges[0]),
-                padded_plane(body.shape[1], self.edges[1]),
-            )
-        self.bins = (-(-self.plane[0] // self.edges[0]), -(-self.plane[1] // self.edges[1]))
-        self.multiplier = WaveVectorMultiplier(self.plane, body.spacing, operator.poisson, inverse=True)
+        self.edges, self.plane_shape, self.bins = bin_layout(body)
+        self.multiplier = WaveVectorMultiplier(self.plane_shape, body.spacing, operator.poisson, inverse=True)
         spacing = (body.spacing[0] * self.edges[0], body.spacing[1] * self.edges[1])
         k = np.hypot(
             fft.wavenumbers(self.bins[0], spacing[0])[:, None],
             fft.wavenumbers(self.bins[1], spacing[1], real=True)[None, :],
         )
-        self.kernel = np.exp(-DECAY * np.sqrt(spacing[0] * spacing[1]) * k)
+        self.poisson_kernel = np.exp(-DECAY * np.sqrt(spacing[0] * spacing[1]) * k)
         row, column = np.divmod(operator.nodes, body.shape[1])
-        self.nodes = row * self.plane[1] + column
+        self.nodes = row * self.plane_shape[1] + column
         self.bin_of_node = row // self.edges[0] * self.bins[1] + column // self.edges[1]
-        self.mask = np.zeros(self.plane, dtype=np.bool_)
+        self.mask = np.zeros(self.plane_shape, dtype=np.bool_)
         self.mask.reshape(-1)[self.nodes] = True
 
         stiffness = operator.node_stiffness
@@ -240,7 +233,7 @@ class TangentialPreconditioner:
 
     def smooth(self, bins: Array) -> Array:
         """Apply the Poisson kernel to the bins."""
-        return fft.irfft2(fft.rfft2(bins) * self.kernel, self.bins)
+        return fft.irfft2(fft.rfft2(bins) * self.poisson_kernel, self.bins)
 
     def apply(self, r: Array) -> Array:
         """Return roughly the traction (2, nodes) that displaces the nodes by r against K + C."""
@@ -251,7 +244,7 @@ class TangentialPreconditioner:
         sums = [self.smooth(self.sum_nodes(values)) for values in symmetric_product(self.share, r)]
         mean = symmetric_product(self.weight, np.stack(sums))
         mean_at_nodes = mean.reshape(2, -1)[:, self.bin_of_node]
-        planes = np.zeros((2, *self.plane))
+        planes = np.zeros((2, *self.plane_shape))
         for plane, bins in zip(planes, mean, strict=True):
             in_bands(fill_outside, self.bins[0], size, *grid, bins, plane)
         rest = r - mean_at_nodes

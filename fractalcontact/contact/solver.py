@@ -70,11 +70,13 @@ class Pressed:
 
     `columns` holds the scalars of the steps, shape (step,), and what has a further axis; `maps` the maps that
     were asked for, shape (step, y, x). `disc_radius` is in m, None for other influence coefficients.
+    `solvers` names the solver of each step, see `Solution`.
     """
 
     columns: dict[str, Array]
     maps: dict[str, Array]
     disc_radius: float | None
+    solvers: tuple[str, ...]
 
 
 def solve(
@@ -106,6 +108,7 @@ def solve(
     """
     path = scaled_path(heights, grid, contact_modulus, options, load)
     rows: list[dict[str, Any]] = []
+    solvers: list[str] = []
     maps: dict[str, list[Array]] = {name: [] for name in keep}
     before: Step | None = None
     for step in track(solve_path(path), progress, "press", total=len(path.values)):
@@ -116,6 +119,7 @@ def solve(
         if "pressure_distribution" in include:
             row |= _pressure_distribution(step.pressure)
         rows.append(row)
+        solvers.append(step.solution.solver)
         for name, planes in maps.items():
             planes.append(np.asarray(MAPS[name](step, heights)))
         before = step
@@ -123,7 +127,7 @@ def solve(
     stacks = {
         name: planes[0][None] if len(planes) == 1 else np.stack(planes) for name, planes in maps.items()
     }
-    return Pressed(columns, stacks, path.disc_radius)
+    return Pressed(columns, stacks, path.disc_radius, tuple(solvers))
 
 
 def rms_slope(heights: Array, grid: Grid) -> float:

@@ -31,9 +31,9 @@ def preconditioned(body, free):
     nodes = np.argwhere(free)
     matrix = np.empty((len(nodes), len(nodes)))
     for k, (i, j) in enumerate(nodes):
-        free_set = FreeSet.empty(precondition.plane, precondition.bin_shape, np.float64)
+        free_set = FreeSet.empty(precondition.plane_shape, precondition.bin_shape, np.float64)
         free_set.mask[: free.shape[0], : free.shape[1]] = free
-        plane = np.zeros(precondition.plane)
+        plane = np.zeros(precondition.plane_shape)
         plane[i, j] = 1.0
         free_set.bin_sums[i // rows, j // columns] = 1.0
         np.add.at(free_set.bin_counts, (nodes[:, 0] // rows, nodes[:, 1] // columns), 1.0)

@@ -147,6 +147,7 @@ def test_free_contact_uses_window(grids, summit):
     closure = (20 * 1e-5) ** 2
     result = press(surface, closure=closure, keep=("state",))
     assert bool(result["converged"].all())
+    assert "window (1 steps)" in result.attrs["provenance"]
     ny, nx = grids[-1]
     assert ny * nx < 0.15 * surface.size
     touched = np.argwhere(result["state"].values[0] > 0)

@@ -43,6 +43,7 @@ def test_provenance():
     assert entry["call"] == "fractalcontact.contact.press"
     assert entry["boundary"] == "periodic"
     assert entry["influence"] == "spectral"
+    assert entry["solver"] == f"whole_plane ({result.sizes['step']} steps)"
     assert entry["achieved_residual"] == float(result["residual"].max())
     assert entry["parameters"]["contact_modulus"] == 1e9
 
