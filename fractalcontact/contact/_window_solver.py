@@ -315,9 +315,7 @@ class WindowSolver:
         for axis, n in enumerate(near.shape):
             rows = np.flatnonzero(near.any(axis=1 - axis))
             first, last = (int(rows[0]), int(rows[-1]) + 1) if rows.size else (0, n)
-            step = max(
-                1, n // 16
-            )  # coarse, so that steps of a path share a window; 4 and 64: as many transforms
+            step = max(1, n // 16)  # coarse: steps of a path share a window; 4 and 64 took as many transforms
             box.append(slice(first // step * step, min(n, -(-last // step) * step)))
         size = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
         if size > largest * near.size or min(s.stop - s.start for s in box) < 3:
@@ -360,7 +358,7 @@ class WindowSolver:
         return self._window[1]
 
     def system(self, part: Problem, dtype: Any) -> ContactSystem:
-        """Return the system of a window in one precision; kept for a free body: its coefficients take time."""
+        """Return the system of a window in one precision; kept for a free body, as that takes time."""
         if dtype in self._systems:
             return self._systems[dtype]
         operator = None
