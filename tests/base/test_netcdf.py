@@ -1,12 +1,10 @@
 """NetCDF files: round trip, compliance, interrupted writes, clear errors."""
 
-import subprocess
-import sys
-
 import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from copies import copied_command
 
 import fractalcontact as fc
 from fractalcontact.base import provenance, schema
@@ -83,8 +81,7 @@ def test_killed_write_leaves_no_incomplete_file(tmp_path, result):
         "fc.save(xr.Dataset({'gap': ('x', [1.0])}), sys.argv[1])\n"
     )
     target = tmp_path / "result.nc"
-    done = subprocess.run([sys.executable, "-c", code, str(target)], check=False)
-    assert done.returncode == -9
+    assert copied_command(target, program=code).returncode == -9
     assert not target.exists()
     left = list(tmp_path.iterdir())
     assert len(left) == 1
@@ -240,8 +237,7 @@ print(sorted(name for name in os.listdir(folder) if name.startswith(".")))
 
 def test_threads_save_open_read_and_read_lazily_at_the_same_time(tmp_path):
     """The NetCDF library ends a process in which two threads use it at the same time."""
-    words = [sys.executable, "-c", THREADS, str(tmp_path)]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    done = copied_command(tmp_path, program=THREADS)
     assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
 
 
@@ -270,7 +266,8 @@ def test_process_forked_during_a_save_can_save(tmp_path, result):
         "saving.join()\n"
         "assert os.waitpid(child, 0)[1] == 0\n"
     )
-    subprocess.run([sys.executable, "-c", code, str(tmp_path)], timeout=120, check=True)
+    done = copied_command(tmp_path, program=code)
+    assert done.returncode == 0, done.stderr
     assert float(fc.open(tmp_path / "child.nc").gap) == 2.0
     assert fc.open(tmp_path / "large.nc").gap.shape == (4, 400, 400)
 

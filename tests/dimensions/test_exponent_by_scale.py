@@ -70,7 +70,7 @@ def test_profile_is_not_changed_by_a_tilt():
 
 
 # of 16 intervals of 95 %, fewer than 14 hold in one case of 23
-@pytest.mark.parametrize(("members", "least"), [(16, 0.84), pytest.param(100, 0.88, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("members", "least"), [(10, 0.79), pytest.param(100, 0.88, marks=pytest.mark.slow)])
 def test_coverage_of_octaves(members, least):
     rng = np.random.default_rng(5)
     surfaces = fc.surfaces.fbm((64, 64), SPACING, hurst=0.4, rms_increment=1e-6, members=members, rng=rng)
@@ -90,7 +90,7 @@ def test_many_gaps_are_refused():
 
 
 def test_gaps_change_no_octave_by_more_than_its_error():
-    for heights in (brownian(0.4, 1e-6, 7, (128, 128)), brownian(0.4, 1e-6, 7, (2000,))):
+    for heights in (brownian(0.4, 1e-6, 7, (64, 64)), brownian(0.4, 1e-6, 7, (600,))):
         complete = scaling(heights)
         heights = np.where(np.random.default_rng(1).random(heights.shape) < 0.1, np.nan, heights)
         result = scaling(heights)

@@ -13,13 +13,14 @@ def surface(heights, periodic=False):
     return fc.surfaces.from_array(heights, 1.0, periodic=periodic)
 
 
-def test_interval_of_a_surface_with_most_of_it_missing():
+@pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.slow)])
+def test_interval_of_a_surface_with_most_of_it_missing(count):
     """fBm of H = 1/2, of which the lowest part of a smooth field is missing: 95 % intervals hold H.
 
     A fit that alternated between two sets of nodes gave 10 of 55.
     """
     hits, errors = [], []
-    for seed in range(20):
+    for seed in range(count):
         rng = np.random.default_rng(seed)
         heights = fc.surfaces.fbm((32, 32), 1.0, hurst=0.5, rms_increment=1.0, rng=seed).values
         field = ndimage.gaussian_filter(rng.standard_normal((32, 32)), 1.0)
@@ -28,8 +29,8 @@ def test_interval_of_a_surface_with_most_of_it_missing():
         if np.isfinite(result.ci_low):
             hits.append(bool(result.ci_low <= 0.5 <= result.ci_high))
             errors.append(float((result.hurst - 0.5) / result.standard_error))
-    assert len(hits) >= 18
-    assert sum(hits) >= 17
+    assert len(hits) >= 0.9 * count - 1
+    assert sum(hits) >= 0.9 * count - 1
     assert np.sqrt(np.mean(np.square(errors))) < 1.5  # standard errors were 1/5 of the true ones
 
 

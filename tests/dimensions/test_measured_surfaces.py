@@ -234,7 +234,13 @@ def drawn(seed):
 
 
 @pytest.mark.parametrize(
-    "part", [0, 1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)]
+    "part",
+    [
+        0,
+        pytest.param(1, marks=pytest.mark.slow),
+        pytest.param(2, marks=pytest.mark.slow),
+        pytest.param(3, marks=pytest.mark.slow),
+    ],
 )
 def test_any_surface_has_an_estimate_or_a_reason(part):
     for seed in range(10 * part, 10 * part + 10):

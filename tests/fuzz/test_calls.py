@@ -1,6 +1,6 @@
 """Public calls with damaged arguments: a clear error that names the argument, or a right answer.
 
-Half a minute with the other tests; `pytest -m fuzz -n2` takes about an hour. A failure prints the seed of its
+A few seconds with the other tests; `pytest -m fuzz -n2` takes about an hour. A failure prints the seed of its
 run (`--hypothesis-seed`) and the smallest call; keep it in KEPT.
 """
 
@@ -32,7 +32,7 @@ from hypothesis import given, settings, strategies
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 
-QUICK, LONG = 400, 60_000
+QUICK, LONG = 200, 60_000
 
 
 # errors of these name what the argument stands for, the file, or the first argument, refused as it stands

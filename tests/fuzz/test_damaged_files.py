@@ -19,7 +19,7 @@ from fractalcontact.base.errors import UnreadableFile
 
 # rasterio prints an exception where it cannot decode what GDAL says of a damaged file
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-QUICK, LONG = 200, 30_000
+QUICK, LONG = 100, 30_000
 
 
 def check(pick):

@@ -1,12 +1,10 @@
 """A study to PNG files: exactly the figures it has data for."""
 
-import subprocess
-import sys
-
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
+from copies import copied_command
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import fractalcontact as fc
@@ -150,4 +148,5 @@ def test_no_pyplot_and_no_figure_left(tmp_path, study):
         "gc.collect()\n"
         "assert not [o for o in gc.get_objects() if isinstance(o, Figure)]\n"
     )
-    subprocess.run([sys.executable, "-c", script], check=True, timeout=120)
+    done = copied_command(program=script)
+    assert done.returncode == 0, done.stderr
