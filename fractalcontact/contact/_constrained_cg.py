@@ -375,8 +375,14 @@ class ConstrainedCG:
             count, g_sum = inside.count + outside.count, inside.g + outside.g
         if count == 0:
             return False
-        t_sum, t_g = self.search_direction(self.dtype(evaluation.closure), admit, count, g_sum)
-        tau = self.step_length(t_g)
+        closure = self.dtype(evaluation.closure)
+        z, constant, beta = self.preconditioned_residual(closure, admit, count, g_sum)
+        factors, state = (self.dtype(constant), self.dtype(beta)), (self.h, self.u, closure)
+        t_sum, t_g = self.pass_sums(
+            _kernels.search_direction, self.free_set.mask, z, *factors, *state, self.t
+        )[:2]  # (6)
+        t_r = self.operator.work(self.t)  # by one transform; that for r is left to a step that needs it (7)
+        tau = float(t_g / t_r) if t_r > 0 and t_g > 0 else None  # (8); none where t does not descend
         if not self.force_controlled and t_g > 0 and t_sum > 0:
             # At full contact K t = 0 for uniform t, so tau is unbounded: limit the step to the one that
             # removes the whole force (1 % more, so that it is clipped; .01 and 50 % took as many transforms).
@@ -386,13 +392,6 @@ class ConstrainedCG:
             return False
         self.tau = tau
         return True
-
-    def search_direction(self, closure: Any, admit: bool, count: float, g_sum: float) -> tuple[float, float]:
-        """Set t = z - constant + beta t on the free set (6); return sum t and sum t g."""
-        z, constant, beta = self.preconditioned_residual(closure, admit, count, g_sum)
-        mask, factors = self.free_set.mask, (self.dtype(constant), self.dtype(beta))
-        sums = self.pass_sums(_kernels.search_direction, mask, z, *factors, self.h, self.u, closure, self.t)
-        return sums[0], sums[1]
 
     def preconditioned_residual(
         self, closure: Any, admit: bool, count: float, g_sum: float, *, slight_change: float = 0.001
@@ -435,14 +434,6 @@ class ConstrainedCG:
         """
         displacement = self.preconditioner.summed_displacement(self.free_set)
         return g_sum / displacement if displacement is not None and displacement > 0 else 0.0
-
-    def step_length(self, t_g: float) -> float | None:
-        """Return tau = sum t g / sum t r (8), with r = K t; None where t does not descend.
-
-        The sum takes one transform; the other one, for r, is left to a step that needs it.
-        """
-        t_r = self.operator.work(self.t)
-        return float(t_g / t_r) if t_r > 0 and t_g > 0 else None
 
     # step
 

@@ -150,6 +150,11 @@ class Step:
         return float(np.sum(np.concatenate(row_sums))) / gap.size * self.path.units.height
 
     @property
+    def stiffness(self) -> float:
+        """Force over closure of a punch, N/m: infinite in full contact of a periodic body."""
+        return self.force / self.closure if self.closure > 0 else math.inf
+
+    @property
     def elastic_energy(self) -> float:
         """Elastic energy in J."""
         return 0.5 * self.solution.work * self.path.units.energy
@@ -309,8 +314,3 @@ def press_punch(
         tolerance=max(step.path.tolerance, tolerance),
     )
     return next(solve_path(path, lambda _: guess))
-
-
-def stiffness_of(punch: Step) -> float:
-    """Return force over closure, in N/m: infinite in full contact of a periodic body."""
-    return punch.force / punch.closure if punch.closure > 0 else math.inf

@@ -5,9 +5,10 @@ The kernels are imported where they run, because options are validated without t
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from copy import copy
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -19,54 +20,64 @@ SMALL = 128 * 128  # nodes up to which tables of the modes are kept, also for th
 NO_WORK: Array = np.empty(0)  # of a filter whose work is not asked for
 
 
-class Operator(Protocol):
+class Operator(ABC):
     """Displacement from pressure; counts its pairs of transforms, half a pair for one way."""
 
-    transforms: float
+    def __init__(self, *, is_small: bool) -> None:
+        self.is_small = is_small  # the displacement comes with the work, in one call
+        self.latest: Array = np.empty(0)  # displacement that came with the work of a small one
+        self.transforms = 0.0
 
+    @abstractmethod
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, both (ny, nx); an operator may write it into `out`."""
-        ...
+
+    def filter_and_work(self, pressure: Array) -> float:
+        """Compute the modes of the displacement by one transform; return the work from them (Parseval)."""
+        raise NotImplementedError
+
+    def from_modes(self, out: Array | None = None) -> Array:
+        """Return the displacement with the present modes, which are used up."""
+        raise NotImplementedError
 
     def work(self, pressure: Array) -> float:
-        """Return the sum of pressure times displacement; of a large plane by one transform (Parseval)."""
-        ...
+        """Return the sum of pressure times displacement."""
+        if self.is_small:
+            self.latest = self.apply(pressure)
+            return float(np.sum(pressure * self.latest, dtype=np.float64))
+        self.transforms += 0.5
+        return self.filter_and_work(pressure)
 
     def displacement(self, out: Array | None = None) -> Array:
         """Return the displacement under the pressure of the last call, which was of `work`."""
-        ...
+        if self.is_small:
+            return self.latest
+        self.transforms += 0.5
+        return self.from_modes(out)
 
 
-class PeriodicOperator:
+class PeriodicOperator(Operator):
     """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean."""
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
         self.multiplier = WavenumberMultiplier(shape, spacing)
-        self.latest: Array | None = None  # displacement that came with the work on a small plane
-        self.transforms = 0.0
+        super().__init__(is_small=self.multiplier.is_small)
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, without its mean."""
         self.transforms += 1
         return self.multiplier.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
 
-    def work(self, pressure: Array) -> float:
-        """Return the sum of pressure times displacement."""
-        if self.multiplier.is_small:
-            self.latest = self.apply(pressure)
-            return product_sum(pressure, self.latest)
-        self.transforms += 0.5
+    def filter_and_work(self, pressure: Array) -> float:
+        """Compute the modes of the displacement, and the work from them."""
         return self.multiplier.work(pressure, 2.0, invert=True, mean=0.0)
 
-    def displacement(self, out: Array | None = None) -> Array:
-        """Return the displacement under the pressure of the last call, which was of `work`."""
-        if self.latest is not None:
-            return self.latest
-        self.transforms += 0.5
+    def from_modes(self, out: Array | None = None) -> Array:
+        """Return the displacement with the present modes."""
         return self.multiplier.from_modes(out)
 
 
-class HalfSpaceOperator:
+class HalfSpaceOperator(Operator):
     """Half-space loaded inside a window: convolution on a plane padded so that nothing wraps around."""
 
     def __init__(self, table: Array, dtype: Any = np.float64) -> None:
@@ -74,17 +85,15 @@ class HalfSpaceOperator:
         self.padded = (padded_length(self.shape[0]), padded_length(self.shape[1]))
         self.symbol = convolution_symbol(table, self.padded).astype(dtype)
         self.transform = fft.PlaneTransform(self.padded)
-        self.is_small = self.padded[0] * self.padded[1] <= 4 * SMALL  # padded to twice the length
+        super().__init__(is_small=self.padded[0] * self.padded[1] <= 4 * SMALL)  # padded to twice the length
         self.modes: Any = None  # array of the last transform, for the next one
         self.planes: tuple[Array, Array] | None = None  # padded, of a small body
-        self.latest: Array | None = None  # displacement that came with the work on a small plane
-        self.transforms = 0.0
 
     def rounded(self, dtype: Any) -> HalfSpaceOperator:
         """Return the same operator in another precision, or in the same one with arrays of its own."""
         other = copy(self)
         other.symbol = self.symbol.astype(dtype, copy=False)
-        other.modes, other.planes, other.latest, other.transforms = None, None, None, 0.0
+        other.modes, other.planes, other.transforms = None, None, 0.0
         return other
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
@@ -111,12 +120,8 @@ class HalfSpaceOperator:
         out[...] = displacement
         return out
 
-    def work(self, pressure: Array) -> float:
-        """Return the sum of pressure times displacement."""
-        if self.is_small:
-            self.latest = self.apply(pressure)
-            return product_sum(pressure, self.latest)
-        self.transforms += 0.5
+    def filter_and_work(self, pressure: Array) -> float:
+        """Compute the modes of the displacement, and the work from them."""
         work = np.empty(self.symbol.shape[1])
         self.filter_modes(pressure, work)
         return sum_of_modes(work, self.padded)
@@ -133,15 +138,8 @@ class HalfSpaceOperator:
         modes, self.modes = self.modes, self.modes if self.transform.in_place else None
         return fft.irfft2_cropped(modes, self.padded, self.shape, out)
 
-    def displacement(self, out: Array | None = None) -> Array:
-        """Return the displacement under the pressure of the last call, which was of `work`."""
-        if self.latest is not None:
-            return self.latest
-        self.transforms += 0.5
-        return self.from_modes(out)
 
-
-class PairSum:
+class PairSum(Operator):
     """Sums a table of coefficients over the pairs of a few nodes (iy, ix), without any transform.
 
     A lightly pressed rough body touches at a few dozen nodes scattered over its whole extent. For some ten
@@ -151,23 +149,12 @@ class PairSum:
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.table, self.iy, self.ix = table, iy, ix
         self.all_nodes = np.arange(iy.size)
-        self.latest: Array = np.empty(0)
-        self.transforms = 0.0
+        super().__init__(is_small=True)
 
     # `out` is of no use: these arrays are small
-    def apply(self, value: Array, out: Array | None = None) -> Array:  # noqa: ARG002
-        """Return the sum over all nodes of table[offset] times value, for every node."""
-        return self.sum_at(value, self.all_nodes)
-
-    def work(self, value: Array) -> float:
-        """Return the sum of the values times the sums for them."""
-        self.latest = self.apply(value)
-        return product_sum(value, self.latest)
-
-    # `out` is of no use: these arrays are small
-    def displacement(self, out: Array | None = None) -> Array:  # noqa: ARG002
-        """Return the sums for the values of the last call, which was of `work`."""
-        return self.latest
+    def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
+        """Return the sum over all nodes of table[offset] times the pressure, for every node."""
+        return self.sum_at(pressure, self.all_nodes)
 
     def sum_at(self, value: Array, targets: Array) -> Array:
         """Return the sum for the nodes `targets` (indices); zero for the others."""
@@ -257,11 +244,6 @@ def wavenumber_weights(
     weights = np.repeat(weights, 2, axis=1)
     weights.flags.writeable = False
     return weights
-
-
-def product_sum(one: Array, other: Array) -> float:
-    """Return the sum of the products of two small planes."""
-    return float(np.sum(one * other, dtype=np.float64))
 
 
 def sum_of_modes(columns: Array, shape: tuple[int, int]) -> float:

@@ -36,7 +36,7 @@ import numpy as np
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.schema import SLIP, STICK
-from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path, stiffness_of
+from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path
 from fractalcontact.contact._options import FORCE_ROUNDING
 from fractalcontact.contact._tangential_operator import TangentialOperator
 
@@ -244,7 +244,7 @@ class Superposition:
                 "work": float(np.sum(self.pressure * gap)),  # of p(P) on the gap of P - L/mu
                 "stick_cells": cells,
                 "slip_cells": self.pressure.size - cells,
-                "stiffness": 0.0 if punch is None else stiffness_of(punch),
+                "stiffness": 0.0 if punch is None else punch.stiffness,
                 "residual": step.solution.residual,
                 "converged": step.solution.reason == "converged",
                 "iterations": sum(solution.iterations for solution in solutions),

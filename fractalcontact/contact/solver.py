@@ -27,7 +27,7 @@ from fractalcontact.base.progress import track
 from fractalcontact.base.schema import CONTACT, OPEN, SLIP_MAPS, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._flat_block import block_stiffness
-from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path, stiffness_of
+from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path
 from fractalcontact.contact._options import CONTROLS, FORCE_ROUNDING, ContactOptions, LoadPath, check_scale
 from fractalcontact.contact._superposition import (
     ACCEPTABLE_ERROR,
@@ -222,7 +222,7 @@ def normal_stiffness(step: Step, guess: Array | None = None) -> float:
     `guess` is a pressure to start from. Infinite in full contact of a periodic body.
     """
     punch = press_punch(step, guess)
-    return 0.0 if punch is None else stiffness_of(punch)
+    return 0.0 if punch is None else punch.stiffness
 
 
 def _pressure_distribution(pressure: Array) -> dict[str, Any]:

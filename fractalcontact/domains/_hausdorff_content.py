@@ -35,17 +35,13 @@ def _check(problems: Problems) -> None:
     problems.integer("shifts", at_least=1)
     is_length = problems.number("coarsest", above=0.0, at_most=10.0**DECADES, optional=True)
     if _masks.check_mask(problems):
-        check_square_cells(problems, "mask", given.mask)
-        finest = min(_masks.mask_grid(given.mask).spacing)
+        dy, dx = _masks.mask_grid(given.mask).spacing
+        is_square = abs(dy - dx) <= SQUARE * dx
+        problems.require(is_square, "mask", "square cells", f"spacings {dy:g} and {dx:g} m")
+        finest = min(dy, dx)
         if is_length and given.coarsest is not None:
             expected = f"at least the spacing, {finest:g} m"
             problems.require(given.coarsest >= finest * (1 - 1e-9), "coarsest", expected)
-
-
-def check_square_cells(problems: Problems, argument: str, mask: xr.DataArray) -> None:
-    """Check that the cells of a mask are square, as those of a cover by squares must be."""
-    dy, dx = _masks.mask_grid(mask).spacing
-    problems.require(abs(dy - dx) <= SQUARE * dx, argument, "square cells", f"spacings {dy:g} and {dx:g} m")
 
 
 @public_result(title="Hausdorff content", references=SOURCE, achieved_error="exact", check=_check)
