@@ -377,18 +377,11 @@ def dilatancy_slopes(shears: Array, curves: Array, smoothing: float | None) -> t
     slopes : ndarray, shape (n, m)
     lengths : ndarray, shape (n,)
     """
-    if smoothing is None:
-        return _neighbour_slopes(shears, curves)
-    return _fitted_slopes(shears, curves, float(smoothing))
-
-
-def _neighbour_slopes(x: Array, y: Array) -> tuple[Array, Array]:
-    """Return the slope through the neighbours of every point, and the length between them.
-
-    Of second order inside, also for unequal steps; of first order at the ends.
-    """
-    ends = np.concatenate([x[:1], x, x[-1:]])
-    return np.gradient(y, x, axis=0), ends[2:] - ends[:-2]
+    if smoothing is not None:
+        return _fitted_slopes(shears, curves, float(smoothing))
+    # of second order inside, also for unequal steps; of first order at the ends
+    ends = np.concatenate([shears[:1], shears, shears[-1:]])
+    return np.gradient(curves, shears, axis=0), ends[2:] - ends[:-2]
 
 
 def _fitted_slopes(x: Array, y: Array, window: float) -> tuple[Array, Array]:

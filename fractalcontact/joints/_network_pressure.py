@@ -67,13 +67,16 @@ def pressures(
     number, chosen = np.cumsum(inside) - 1, inside[network.i]
     i, j, conductance = number[network.i[chosen]], number[network.j[chosen]], network.conductance[chosen]
     size = int(inside.sum())
+    # conductance of each cell to held pressures, and the pressure that they make together
+    to_held, inflow = held.conductance.ravel()[inside], held.inflow.ravel()[inside]
+    level = np.divide(inflow, to_held, out=np.zeros_like(inflow), where=to_held > 0)
     outgoing, incoming = np.bincount(i, conductance, size), np.bincount(j, conductance, size)
-    diagonal = outgoing + incoming + held.conductance.ravel()[inside]
+    diagonal = outgoing + incoming + to_held
     index = np.int32 if size < 2**29 else np.int64  # a cell has four links
     links = coo_array((conductance, (i.astype(index), j.astype(index))), shape=(size, size)).tocsr()
     matrix = (diags_array(diagonal) - links - links.T).tocsr()
     even = even_gradient(network.shape, axis)
-    balance = Balance(i, j, conductance, network.jump[chosen], *_held_levels(inside, held))
+    balance = Balance(i, j, conductance, network.jump[chosen], to_held, level)
     scale, possible = float(np.linalg.norm(balance.surplus(np.zeros(size)))) or 1.0, balance.possible
     p, most = even.ravel()[inside], dissipation(network, even, inside, held)
     if np.linalg.norm(balance.surplus(p)) > 1e-14 * scale:
@@ -100,12 +103,6 @@ class Range(NamedTuple):
 
     def missed_by(self, p: Array) -> float:
         return float(max(p.max() - self.high, self.low - p.min(), 0.0))
-
-
-def _held_levels(inside: Array, held: Held) -> tuple[Array, Array]:
-    """Return the conductance of each cell to held pressures, and the pressure that they make together."""
-    conductance, inflow = held.conductance.ravel()[inside], held.inflow.ravel()[inside]
-    return conductance, np.divide(inflow, conductance, out=np.zeros_like(inflow), where=conductance > 0)
 
 
 class Balance(NamedTuple):

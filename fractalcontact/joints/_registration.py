@@ -130,7 +130,9 @@ def register(
         expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
     moved = resample(up, source_places(pose, low.shape, offset))
-    moved += _tilted_plane(pose, np.isfinite(moved - low))
+    y, x = np.indices(low.shape, dtype=float)
+    tilt_plane = pose.slope[0] * y + pose.slope[1] * x
+    moved += tilt_plane - tilt_plane[np.isfinite(moved - low)].mean()  # none over the common part
     _warn_uncertain(pose)
     result = _dataset(lower, low, moved, pose, grid)
     if turn_upper is None:
@@ -184,13 +186,6 @@ def _warn_uncertain(pose: Pose) -> None:
             "together, turned by a few degrees at most?"
         )
         warn(message, ConvergenceWarning)
-
-
-def _tilted_plane(pose: Pose, common: Array) -> Array:
-    """Return the plane of the tilt, with mean zero over the common part."""
-    y, x = np.indices(common.shape, dtype=float)
-    plane = pose.slope[0] * y + pose.slope[1] * x
-    return np.asarray(plane - plane[common].mean())
 
 
 def _dataset(lower: xr.DataArray, low: Array, moved: Array, pose: Pose, grid: Grid) -> xr.Dataset:

@@ -152,7 +152,10 @@ def self_weight(
         }
     angle = crack.basic_friction_angle + np.degrees(np.arctan(opening / shears[:, None]))
     strength = pressures * np.tan(np.radians(np.where(angle < 90.0, angle, math.nan)))
-    exponents = [_exponent(sizes, row) for row in strength.reshape(-1, sizes.size)]
+    exponents = [
+        fit_line(sizes, row).slope if sizes.size > 1 and (row > 0).all() else math.nan  # False for NaN
+        for row in strength.reshape(-1, sizes.size)
+    ]
     variables |= {
         "dilatancy": (dims, opening),
         "friction_angle": (dims, angle, {"comment": MEAN_ANGLE}),
@@ -168,9 +171,3 @@ def self_weight(
 
 def _is_rigid(crack: Any) -> bool:
     return isinstance(crack, Crack) and crack.young is None and crack.poisson is None
-
-
-def _exponent(sizes: Array, strengths: Array) -> float:
-    if sizes.size < 2 or not (strengths > 0).all():  # False for NaN
-        return math.nan
-    return float(fit_line(sizes, strengths).slope)

@@ -496,30 +496,23 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
     filled = np.nan_to_num(pressure)
     profile, mean = filled.mean(axis=-2 if axis == 1 else -1), filled.mean(axis=(-2, -1))
     centres = [_centre(filled, 0, grid), _centre(filled, 1, grid)]
-    arms = [flow.sense * (centres[axis] - upstream.place)]
-    means, profiles, points = [mean], [profile], [centres]
+    # of the joint, then of each diagram: mean, arm, y and x
+    rows, profiles = [(mean, flow.sense * (centres[axis] - upstream.place), *centres)], [profile]
     for place, p in knots.values():
         a, b, step = p[:-1] / p[0], p[1:] / p[0], np.diff(place)
         force = (a + b) / 2.0 * step
         arm = (force * place[:-1] + step**2 * (a + 2.0 * b) / 6.0).sum() / force.sum()
-        means.append(np.full_like(mean, p[0] * force.sum() / length))
-        arms.append(np.full_like(mean, arm))
+        centre = [0.5 * extent for extent in grid.extent]
+        centre[axis] = upstream.place + flow.sense * arm
+        row = (p[0] * force.sum() / length, arm, *centre)
+        rows.append(tuple(np.full_like(mean, value) for value in row))
         profiles.append(np.broadcast_to(np.interp(flow.distances(), place, p), profile.shape))
-        middle = [0.5 * extent for extent in grid.extent]
-        middle[axis] = upstream.place + flow.sense * arm
-        points.append([np.full_like(mean, place) for place in middle])
-    dims = (*leading, "diagram")
-    return xr.Dataset(
-        {
-            "uplift_force": (dims, np.stack(means, -1) * grid.nominal_area),
-            "mean_uplift": (dims, np.stack(means, -1)),
-            "uplift_arm": (dims, np.stack(arms, -1)),
-            "uplift_y": (dims, np.stack([point[0] for point in points], -1)),
-            "uplift_x": (dims, np.stack([point[1] for point in points], -1)),
-            "uplift_profile": ((*dims, "yx"[axis]), np.stack(profiles, -2)),
-        },
-        coords={"diagram": ["joint", *knots]},
-    )
+    dims, columns = (*leading, "diagram"), np.stack(rows, -1)
+    names = ("mean_uplift", "uplift_arm", "uplift_y", "uplift_x")
+    variables: dict[str, Any] = {name: (dims, column) for name, column in zip(names, columns, strict=True)}
+    variables["uplift_force"] = dims, columns[0] * grid.nominal_area
+    variables["uplift_profile"] = (*dims, "yx"[axis]), np.stack(profiles, -2)
+    return xr.Dataset(variables, {"diagram": ["joint", *knots]})
 
 
 def _centre(pressure: Array, axis: int, grid: Grid) -> Array:
