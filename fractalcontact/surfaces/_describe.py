@@ -39,7 +39,8 @@ def _check(problems: Problems) -> None:
     else:
         check_stack(problems, smallest=3)
     if isinstance(surface, xr.DataArray):
-        check_leading(surface, _result_names(len(core_dims(surface))), problems)
+        names = _gradient_names(len(core_dims(surface)))
+        check_leading(surface, (*HEIGHT_STATISTICS, "missing_points", *names, "run_time"), problems)
 
 
 @public_result(
@@ -114,11 +115,6 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     result.attrs["derivatives"] = "modes" if by_modes else "differences"
     _explain_missing(result, math.prod(grid.shape))
     return result
-
-
-def _result_names(axes: int) -> list[str]:
-    """Return the names of all variables of the result for a plane (2 axes) or a profile."""
-    return [*HEIGHT_STATISTICS, "missing_points", *_gradient_names(axes), "run_time"]
 
 
 def _explain_missing(result: xr.Dataset, size: int) -> None:

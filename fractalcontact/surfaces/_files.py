@@ -173,7 +173,7 @@ def read_table(path: Path) -> Table:
     if len(lines) > 1 and lines[0][1].isdigit() and int(lines[0][1]) == len(lines) - 1:
         lines = lines[1:]
     first = lines[0][1]
-    delimiter = _delimiter(first)
+    delimiter = next((mark for mark in ";\t," if mark in first), None)
     is_named = len(lines) > 1 and _has_no_number(first.split(delimiter))
     rows = lines[1:] if is_named else lines
     comma = _has_decimal_comma(next((content for _, content in rows if "," in content), ""))
@@ -239,10 +239,6 @@ def _header(line: str, delimiter: str | None, columns: int) -> tuple[tuple[str, 
         return (), ()
     found = [match for match in matches if match is not None]
     return tuple(match["name"].strip() for match in found), tuple(match["unit"] or "" for match in found)
-
-
-def _delimiter(line: str) -> str | None:
-    return next((mark for mark in ";\t," if mark in line), None)
 
 
 def _parsed(lines: list[tuple[int, str]], delimiter: str | None) -> Array:

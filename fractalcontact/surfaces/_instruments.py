@@ -44,6 +44,8 @@ def read_instrument(request: Request) -> FileContent:
     UnreadableFile
         Corrupt, of an unknown format, without a unit or a size, or not on a grid.
     """
+    from importlib.metadata import version
+
     path, units, spacing = request.path, request.units, request.spacing
     if importlib.util.find_spec("SurfaceTopography") is None:
         raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
@@ -53,7 +55,9 @@ def read_instrument(request: Request) -> FileContent:
         reader, other_unit = _open(file, path)
         chosen = _channel(reader, request.channel, path.name)
         name = str(reader.format())
-        size, unit, lateral = _stated(chosen, other_unit, units or ("m" if name in ARRAYS else None))
+        size, given = chosen.physical_sizes, units or ("m" if name in ARRAYS else None)
+        lateral, vertical = chosen.unit if isinstance(chosen.unit, tuple) else (chosen.unit, chosen.unit)
+        unit, lateral = given or other_unit or vertical, lateral or given
         with Problems(WHERE, UnreadableFile) as problems:
             _check(problems, chosen, size, unit, lateral, spacing)
         heights, periodic = _heights(reader, chosen, size, path.name)
@@ -62,9 +66,9 @@ def read_instrument(request: Request) -> FileContent:
     entries = {
         "format": name,
         "channel": str(chosen.name),
-        "stated_unit": other_unit or _plain_unit(chosen.unit),
+        "stated_unit": other_unit or (list(chosen.unit) if isinstance(chosen.unit, tuple) else chosen.unit),
         "stated_size": None if size is None else [float(edge) for edge in size],
-        "reader": f"SurfaceTopography {_version()}",
+        "reader": f"SurfaceTopography {version('SurfaceTopography')}",
         "reader_warnings": sorted({str(message.message) for message in messages}) or None,
         "first_row": row,
     }
@@ -136,15 +140,6 @@ def _other_unit(head: bytes) -> str | None:
     match = DATA_UNIT.search(head)
     unit = match.group(1).decode("utf-8", "replace") if match else None
     return unit if unit not in UNITS else None
-
-
-def _stated(chosen: Any, other_unit: str | None, units: str | None) -> tuple[Any, str | None, str | None]:
-    """Return the lateral size, the effective unit of the heights, and the unit of the size."""
-    unit = chosen.unit
-    lateral, vertical = unit if isinstance(unit, tuple) else (unit, unit)
-    if other_unit is not None:
-        vertical = other_unit
-    return chosen.physical_sizes, units or vertical, lateral or units
 
 
 def _check(
@@ -268,13 +263,3 @@ def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:
             "a raster with a position; give `spacing`, or read a mask with fractalcontact.domains.read_mask"
         )
         problems.require(not is_plain or spacing is not None, "path", expected, "an image without one")
-
-
-def _plain_unit(unit: Any) -> Any:
-    return list(unit) if isinstance(unit, tuple) else unit
-
-
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version("SurfaceTopography")

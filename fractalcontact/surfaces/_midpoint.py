@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -100,77 +101,93 @@ def midpoint(
     entries = {"achieved_error": f"about {error:.1g} of the mean square increments over 64 points"}
 
     def draw_heights(stream: np.random.Generator) -> tuple[Array, dict[str, Any]]:
-        heights = _displaced(levels, (dy / dx, 1.0), float(hurst), stream, additions=bool(additions))
+        heights = _displaced(levels, (dy / dx, 1.0), Displacement(float(hurst), bool(additions), stream))
         return float(rms_increment) * heights[:ny, :nx], entries
 
     return _new_surface.draw_ensemble(draw_heights, (dy, dx), members=members, rng=rng)
 
 
-def _displaced(
-    levels: int, spacing: tuple[float, float], hurst: float, rng: np.random.Generator, *, additions: bool
-) -> Array:
+@dataclass(frozen=True)
+class Displacement:
+    """Normal displacements of points about the mean of their neighbours.
+
+    With `additions` all points are displaced at each stage (Saupe 1988).
+    """
+
+    hurst: float
+    additions: bool
+    rng: np.random.Generator
+
+    def draw(self, deviation: float | Array, shape: tuple[int, ...]) -> Array:
+        """Return normal numbers of a standard deviation."""
+        return np.asarray(deviation * self.rng.standard_normal(shape))
+
+    def variograms(self, places: Points) -> tuple[Array, Array]:
+        """Return the mean square increments between the origin and each place, and between all of these."""
+        points, power = np.array(places), 2 * self.hurst
+        return np.hypot(*points.T) ** power, np.hypot(*(points[:, None] - points).transpose(2, 0, 1)) ** power
+
+    def deviation(self, neighbours: Points) -> float:
+        """Return the standard deviation of the displacement of a point at the origin.
+
+        Without additions it is that of a fractional Brownian surface about the mean of these neighbours. With
+        additions the nearest neighbour is displaced too, and both displacements together give the variogram
+        between it and the point.
+        """
+        away, apart = self.variograms(neighbours)
+        if not self.additions:
+            return math.sqrt(away.mean() - 0.5 * apart.mean())
+        nearest = int(np.argmin(away))
+        variance_of_mean = float(apart[nearest].mean() - 0.5 * apart.mean())
+        return math.sqrt(max(0.0, 0.5 * (float(away[nearest]) - variance_of_mean)))
+
+
+def _displaced(levels: int, spacing: tuple[float, float], displacement: Displacement) -> Array:
     """Return heights aimed at E[(z(a) - z(b))^2] = r^(2H), shape (2^levels + 1,) * 2.
 
     Each point is the mean of its neighbours of the coarser grid plus a normal number. Its variance is that
     of a fractional Brownian surface about that mean, conditioned on these neighbours alone: leaving out all
-    others is the error of the method. `additions` displaces all points at each stage (Saupe 1988).
+    others is the error of the method.
     """
     n = (1 << levels) + 1
     heights = np.zeros((n, n))
     step = n - 1
-    heights[::step, ::step] = _corners((step * spacing[0], step * spacing[1]), hurst, rng)
+    heights[::step, ::step] = _corners((step * spacing[0], step * spacing[1]), displacement)
     while step > 1:
         half = step // 2
         reach = (half * spacing[0], half * spacing[1])
-        _centres(heights, step, reach, hurst, rng, additions=additions)
-        _edges(heights, step, reach, hurst, rng, additions=additions)
+        _centres(heights, step, reach, displacement)
+        _edges(heights, step, reach, displacement)
         step = half
     return heights
 
 
-def _corners(edges: tuple[float, float], hurst: float, rng: np.random.Generator) -> Array:
+def _corners(edges: tuple[float, float], displacement: Displacement) -> Array:
     """Draw four exact corners; the first is at height 0."""
-    points = np.array([(0.0, edges[1]), (edges[0], 0.0), edges])
-    far = np.hypot(*points.T) ** (2 * hurst)
-    apart = np.hypot(*(points[:, None] - points).transpose(2, 0, 1)) ** (2 * hurst)
+    far, apart = displacement.variograms([(0.0, edges[1]), (edges[0], 0.0), edges])
     factor = np.linalg.cholesky(0.5 * (far[:, None] + far - apart))
-    return np.array([0.0, *(factor * rng.standard_normal(3)).sum(axis=1)]).reshape(2, 2)
+    drawn = (factor * displacement.rng.standard_normal(3)).sum(axis=1)
+    return np.array([0.0, *drawn]).reshape(2, 2)
 
 
-def _centres(
-    heights: Array,
-    step: int,
-    reach: tuple[float, float],
-    hurst: float,
-    rng: np.random.Generator,
-    *,
-    additions: bool,
-) -> None:
+def _centres(heights: Array, step: int, reach: tuple[float, float], displacement: Displacement) -> None:
     """Give the centre of each square the mean of its corners, displaced."""
     corners = heights[::step, ::step]
     mean = 0.25 * (corners[:-1, :-1] + corners[:-1, 1:] + corners[1:, :-1] + corners[1:, 1:])
     y, x = reach
-    deviation = _deviation([(-y, -x), (-y, x), (y, -x), (y, x)], hurst, additions=additions)
-    heights[step // 2 :: step, step // 2 :: step] = mean + deviation * rng.standard_normal(mean.shape)
-    if additions:
-        corners += deviation * rng.standard_normal(corners.shape)
+    deviation = displacement.deviation([(-y, -x), (-y, x), (y, -x), (y, x)])
+    heights[step // 2 :: step, step // 2 :: step] = mean + displacement.draw(deviation, mean.shape)
+    if displacement.additions:
+        corners += displacement.draw(deviation, corners.shape)
 
 
-def _edges(
-    heights: Array,
-    step: int,
-    reach: tuple[float, float],
-    hurst: float,
-    rng: np.random.Generator,
-    *,
-    additions: bool,
-) -> None:
+def _edges(heights: Array, step: int, reach: tuple[float, float], displacement: Displacement) -> None:
     """Give the middle of each edge the mean of its two ends and of the centres beside it, displaced."""
     half = step // 2
     y, x = reach
     corners, centres = heights[::step, ::step], heights[half::step, half::step]
     four = [(0.0, -x), (0.0, x), (-y, 0.0), (y, 0.0)]
-    inside = _deviation(four, hurst, additions=additions)
+    inside = displacement.deviation(four)
     for axis in (0, 1):
         ends = np.moveaxis(corners, axis, 0)  # edges run along `axis`
         beside = np.moveaxis(centres, axis, 0)
@@ -181,29 +198,10 @@ def _edges(
         total[:, [0, -1]] /= 3.0
         deviation = np.full(total.shape[1], inside)
         along = [(-y, 0.0), (y, 0.0)] if axis == 0 else [(0.0, -x), (0.0, x)]
-        deviation[[0, -1]] = _deviation(
-            [*along, (0.0, x) if axis == 0 else (y, 0.0)], hurst, additions=additions
-        )
-        total += deviation * rng.standard_normal(total.shape)
+        deviation[[0, -1]] = displacement.deviation([*along, (0.0, x) if axis == 0 else (y, 0.0)])
+        total += displacement.draw(deviation, total.shape)
         rows, columns = (slice(half, None, step), slice(None, None, step))
         np.moveaxis(heights, axis, 0)[rows, columns] = total
-    if additions:
-        corners += inside * rng.standard_normal(corners.shape)
-        centres += inside * rng.standard_normal(centres.shape)
-
-
-def _deviation(neighbours: Points, hurst: float, *, additions: bool) -> float:
-    """Return the standard deviation of the displacement of a point at the origin.
-
-    Without additions it is that of a fractional Brownian surface about the mean of these neighbours. With
-    additions the nearest neighbour is displaced too, and both displacements together give the variogram
-    between it and the point.
-    """
-    places = np.array(neighbours)
-    away = np.hypot(*places.T) ** (2 * hurst)
-    apart = np.hypot(*(places[:, None] - places).transpose(2, 0, 1)) ** (2 * hurst)
-    if not additions:
-        return math.sqrt(away.mean() - 0.5 * apart.mean())
-    nearest = int(np.argmin(away))
-    variance_of_mean = float(apart[nearest].mean() - 0.5 * apart.mean())
-    return math.sqrt(max(0.0, 0.5 * (float(away[nearest]) - variance_of_mean)))
+    if displacement.additions:
+        corners += displacement.draw(inside, corners.shape)
+        centres += displacement.draw(inside, centres.shape)
