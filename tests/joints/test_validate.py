@@ -1,9 +1,11 @@
 """`validate` of every public function: the checks of a call, without its computation."""
 
+import re
 from time import process_time
 
 import numpy as np
 import pytest
+from calls import CALLS
 
 import fractalcontact as fc
 
@@ -52,3 +54,28 @@ def test_validate_accepts_a_call_and_computes_nothing(crack, make_face, teeth):
     fc.joints.register.validate(face, face)
     fc.joints.transmissivity.validate(face)
     fc.joints.roughness_coefficient.validate(face, lag=S)
+
+
+@pytest.mark.parametrize(
+    ("name", "argument"),
+    [
+        ("strength_envelope", "criterion"),
+        ("roughness_coefficient", "regression"),
+        ("hydraulic_aperture", "model"),
+        ("friction", "form"),
+        ("closure", "bulk"),
+        ("closure", "keep"),
+        ("partial_slip", "keep"),
+        ("direct_shear", "keep"),
+        ("transmissivity", "keep"),
+        ("register", "turn_upper"),
+    ],
+)
+def test_docstring_names_every_word_that_is_accepted(name, argument):
+    function = getattr(fc.joints, name)
+    with pytest.raises(fc.base.errors.InvalidInput) as caught:
+        function.validate(**(CALLS[f"joints.{name}"]() | {argument: "nothing"}))
+    message = next(line for line in caught.value.problems if line.startswith(f"{argument}: expected"))
+    words = re.findall(r"'(\w+)'", message.partition(", got ")[0])
+    assert len(words) > 1
+    assert [word for word in words if f'"{word}"' not in function.__doc__] == []
