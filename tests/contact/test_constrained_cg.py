@@ -7,6 +7,7 @@ import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.contact import _window_solver
 from fractalcontact.contact._flat_block import flat_block
+from fractalcontact.contact._kernels import projected_step_sums
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet
 from fractalcontact.contact._scaled_problem import Body
 
@@ -219,3 +220,12 @@ def test_flat_surface_converges_only_to_the_tolerance_that_rounding_leaves():
     body = Body((24, 24), (1e-4, 1e-4), False, "disc", 0.4365941e-4)
     assert flat_block(body).stopped_by == "rounding"
     assert flat_block(body, max_iterations=3).stopped_by == "iteration_limit"
+
+
+def test_projection_counts_only_violations():
+    pressure = np.array([[1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.0]])
+    direction = np.array([[-0.1, 0.0, -0.5, -0.6, 0.5, 0.6, 0.0]])  # beyond the cap: 0, 3; below zero: 5
+    out = np.zeros((1, 8))
+    projected_step_sums(0, 1, 1, pressure, direction, 1.0, 1.0, out)
+    assert out[0, 0] == 3
+    assert out[0, 1] == pytest.approx(4.0)

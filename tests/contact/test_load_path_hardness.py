@@ -190,14 +190,3 @@ def test_load_above_hardness_is_refused():
     area = float(fc.contact.press(surface, contact_modulus=MODULUS, closure=0)["nominal_area"])
     with pytest.raises(InvalidInput, match="normal_force: .*hardness times area"):
         fc.contact.press(surface, contact_modulus=MODULUS, normal_force=1.01e7 * area, hardness=1e7)
-
-
-def test_projection_counts_only_violations():
-    from fractalcontact.contact._kernels import projected_step_sums
-
-    pressure = np.array([[1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.0]])
-    direction = np.array([[-0.1, 0.0, -0.5, -0.6, 0.5, 0.6, 0.0]])  # beyond the cap: 0, 3; below zero: 5
-    out = np.zeros((1, 8))
-    projected_step_sums(0, 1, 1, pressure, direction, 1.0, 1.0, out)
-    assert out[0, 0] == 3
-    assert out[0, 1] == pytest.approx(4.0)

@@ -292,13 +292,19 @@ def test_tables_over_the_same_rows_are_one_on_the_screen(ensemble):
     assert "box D (random)" in head
 
 
-def test_caveats_on_the_screen_are_three_at_most(ensemble, monkeypatch):
-    limits = [f"limit number {k}" for k in range(5)]
-    monkeypatch.setattr("fractalcontact.scenes._summary.caveats", lambda tree: limits)
-    text = fc.scenes.summary(ensemble)
-    assert [limit in text for limit in limits] == [True] * 3 + [False] * 2
-    assert "caveats left out: 2" in text
-    assert all(limit in fc.scenes.summary(ensemble, verbose=True) for limit in limits)
+def test_caveats_on_the_screen_are_three_at_most(tmp_path):
+    """Of a soft steep face: islands, pressures and slopes, each of the surface and of the joint."""
+    text = SOUND.replace("rms_increment = 4e-6", "rms_increment = 5e-5").replace("hurst = 0.8", "hurst = 0.3")
+    text = text.replace("poisson = 0.2", "poisson = 0.2\nyield_pressure = 1e6")
+    text = text.replace("[want]", "[contact]\nnormal_force = [1.0, 10.0]\n[want]\ncontact = ['press']")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    tree = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    limits = tree.attrs["caveats"].splitlines()
+    assert len(limits) == 6
+    shown, whole = (" ".join(fc.scenes.summary(tree, verbose=each).split()) for each in (False, True))
+    assert [limit in shown for limit in limits] == [True] * 3 + [False] * 3
+    assert "caveats left out: 3" in shown
+    assert all(limit in whole for limit in limits)
 
 
 def test_analysis_of_the_contact_set_is_on_the_screen(tmp_path):

@@ -131,11 +131,9 @@ def test_lines_inside_the_block_are_lines_of_its_coordinates(scene):
 
 
 def test_a_stopped_study_resumes_after_the_uplift(scene, tmp_path, monkeypatch):
-    path, out = scene(SCENE.replace("figures = true", "figures = false")), tmp_path / "out"
+    path, out = scene(SCENE), tmp_path / "out"
     whole = fc.scenes.run(path, progress=False)
-    from fractalcontact.scenes import _run
-
-    monkeypatch.setattr(_run, "write_report", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(fc.plotting, "draw", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         fc.scenes.run(path, out=out, progress=False)
     monkeypatch.undo()
