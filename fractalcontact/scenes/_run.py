@@ -234,16 +234,12 @@ def _run(
         raise signals.Stopped(
             stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
         )
-    # before figures and report: a disk that fills, or a kill, while they are made loses nothing
-    netcdf.save(tree, folder / RESULT)
-    (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+    calls = partial(_save_and_draw, tree, scene, folder, progress), partial(page_contents, tree)
+    # a copy of this process prepares the page meanwhile
+    results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
+    figures, contents = results[0], results[1]
     with _beside_the_result():
-        figures, contents = [], None
         if scene.want.figures:
-            # a copy of this process prepares the page meanwhile
-            calls = partial(_draw, tree, folder, progress), partial(page_contents, tree)
-            results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
-            figures, contents = results[0], results[1]
             note_run_time(tree, start)
             _results_folder.remove_old_figures(folder, figures)
         whole = summary_of(tree)
@@ -257,6 +253,15 @@ def _run(
     if not study.failures:
         store.clear()
     return tree, whole
+
+
+def _save_and_draw(tree: xr.DataTree, scene: Scene, folder: Path, progress: bool) -> list[Path]:
+    """Save the results, draw the figures if they are wanted, and return their files."""
+    # before figures and report: a disk that fills, or a kill, while they are made loses nothing
+    netcdf.save(tree, folder / RESULT)
+    (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+    with _beside_the_result():
+        return _draw(tree, folder, progress) if scene.want.figures else []
 
 
 def _text(tree: xr.DataTree, whole: Summary | None, *, verbose: bool) -> str:
