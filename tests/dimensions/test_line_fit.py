@@ -87,16 +87,6 @@ def test_no_interval_of_the_spectrum_where_the_heights_are_not_fractional_browni
     assert plain.note.item() == plain.reason.item() == ""
 
 
-def test_estimates_by_a_curve_do_not_run_the_likelihood(monkeypatch):
-    def fail(*_):
-        raise AssertionError("the likelihood was called")
-
-    monkeypatch.setattr("fractalcontact.dimensions._estimate.likelihood", fail)
-    names = [name for name in fc.dimensions.methods() if name != "likelihood"]
-    surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.6, rms_increment=1e-6, rng=3)
-    assert np.isfinite(fc.dimensions.estimate(surface, names).hurst).all()
-
-
 @pytest.mark.parametrize(
     ("method", "surface", "word"),
     [
