@@ -509,8 +509,8 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
         profiles.append(np.broadcast_to(np.interp(flow.distances(), place, p), profile.shape))
     dims, columns = (*leading, "diagram"), np.stack(rows, -1)
     names = ("mean_uplift", "uplift_arm", "uplift_y", "uplift_x")
-    variables: dict[str, Any] = {name: (dims, column) for name, column in zip(names, columns, strict=True)}
-    variables["uplift_force"] = dims, columns[0] * grid.nominal_area
+    variables: dict[str, Any] = {"uplift_force": (dims, columns[0] * grid.nominal_area)}
+    variables |= {name: (dims, column) for name, column in zip(names, columns, strict=True)}
     variables["uplift_profile"] = (*dims, "yx"[axis]), np.stack(profiles, -2)
     return xr.Dataset(variables, {"diagram": ["joint", *knots]})
 

@@ -278,7 +278,9 @@ def _powers(values: Array, mean: float) -> Array:
     """Return the sums of |d|, d^2, d^3 and d^4 of the deviations d from the mean."""
     deviation = values.ravel() - mean
     squares = deviation * deviation  # higher powers as products: numpy takes ten times as long for values**3
-    return np.array([np.abs(deviation).sum(), squares.sum(), squares @ deviation, squares @ squares])
+    # not `squares @ deviation`, whose last digits depend on the threads of BLAS
+    cube, fourth = (float(np.einsum("i,i->", squares, other)) for other in (deviation, squares))
+    return np.array([np.abs(deviation).sum(), squares.sum(), cube, fourth])
 
 
 def _heights(
