@@ -186,6 +186,27 @@ def stretched(n: int, hurst: float, rng: Generator) -> Array:
     return brownian(2 * n, hurst, rng)[::2, :n]
 
 
+def through_lens(n: int, hurst: float, rng: Generator, finest: float) -> Array:
+    """Return a surface seen by a lens without aberrations, in incoherent light (Goodman 2005).
+
+    It shows no waves shorter than `finest` spacings.
+    """
+    z = brownian(n + 2 * MARGIN, hurst, rng)
+    edge = z.shape[0]
+    mirrored = np.pad(z, ((0, edge), (0, edge)), "symmetric")  # so that opposite edges do not meet
+    share = np.minimum(finest * np.hypot(np.fft.fftfreq(2 * edge)[:, None], np.fft.rfftfreq(2 * edge)), 1.0)
+    transfer = 2.0 / np.pi * (np.arccos(share) - share * np.sqrt(1.0 - share**2))
+    seen = np.fft.irfft2(np.fft.rfft2(mirrored) * transfer, mirrored.shape)
+    return inner(seen[:edge, :edge], n)
+
+
+def modulated(n: int, hurst: float, rng: Generator) -> Array:
+    """Return heights whose amplitude is lognormal, .3, and smooth over a sixteenth of the extent."""
+    field = ndimage.gaussian_filter(rng.standard_normal((n, n)), n / 16.0)
+    z = brownian(n, hurst, rng)
+    return np.asarray((z - z.mean()) * np.exp(0.3 * (field - field.mean()) / field.std()))
+
+
 def profile(n: int, hurst: float, rng: Generator, spread: float = 0.0) -> Array:
     """Return n points of an exact profile (Davies and Harte 1987), after a blur."""
     size = n + 2 * MARGIN
@@ -227,6 +248,8 @@ KINDS: dict[str, tuple[Callable[..., Array], tuple[float, ...]]] = {
     "rounded": (lambda n, hurst, rng: np.round(brownian(n, hurst, rng) / 0.5) * 0.5, THREE),
     "skewed": (skewed, THREE),
     "anisotropic": (stretched, THREE),
+    "lens": (partial(through_lens, finest=3.0), THREE),
+    "modulated": (modulated, THREE),
     "profile": (profile, THREE),
     "profile_blur_1": (partial(profile, spread=1.0), THREE),
 }
