@@ -1,5 +1,6 @@
 """Cost of a solution: transforms, memory, windows; and bits independent of threads and units."""
 
+import itertools
 import tracemalloc
 
 import numpy as np
@@ -39,16 +40,27 @@ def library(request, monkeypatch):
     return request.param
 
 
-@pytest.mark.parametrize("single", [True, False])
-@pytest.mark.parametrize("boundary", ["periodic", "free"])
+LIBRARIES, BOUNDARIES = ("ducc0", "scipy"), ("periodic", "free")
+CONTROLS = ("nominal_pressure", "closure", "hardness")
+# half of all combinations: any two values of two of the four are together in one of them
+FAST = [
+    (LIBRARIES[i], single, BOUNDARIES[(i + single) % 2], control)
+    for i, single, control in itertools.product((0, 1), (True, False), CONTROLS)
+]
+COMBINED = itertools.product(LIBRARIES, (True, False), BOUNDARIES, CONTROLS)
+
+
 @pytest.mark.parametrize(
-    ("control", "force"), [("nominal_pressure", True), ("closure", False), ("hardness", True)]
+    ("library", "single", "boundary", "control"),
+    [pytest.param(*each, marks=[] if each in FAST else pytest.mark.slow) for each in COMBINED],
+    indirect=["library"],
 )
-def test_bits_independent_of_units_and_threads(library, monkeypatch, single, boundary, control, force):
+def test_bits_independent_of_units_and_threads(library, monkeypatch, single, boundary, control):
     monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0 if single else 10**9)
     monkeypatch.setattr(threads, "SHARE", 1000)  # so that small passes are shared among threads too
     monkeypatch.setattr(fft, "SMALL", 1000)
     surface, keep = rough(64), ("state", "pressure", "gap", "displacement")
+    force = control != "closure"
     path = (
         {"nominal_pressure": MODULUS * np.array([1e-3, 4e-3, 2e-3])} if force else {"closure": [2e-5, 3e-5]}
     )
