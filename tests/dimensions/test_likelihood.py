@@ -55,16 +55,17 @@ def test_stretched_surface_keeps_its_exponent(hurst, axis):
     assert abs(np.median(errors)) < 0.04
 
 
-def test_interval_of_a_sum_of_two_surfaces_holds_the_smaller_exponent():
+@pytest.mark.parametrize(("members", "least"), [(5, 3), pytest.param(8, 5, marks=pytest.mark.slow)])
+def test_interval_of_a_sum_of_two_surfaces_holds_the_smaller_exponent(members, least):
     """H = .3 and .8, equal at a lag of 8 spacings; without sums in the model 3 of 24 intervals hold .3."""
     held = []
-    for seed in range(8):
+    for seed in range(members):
         rough = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.3, rms_increment=1e-6, rng=seed).values
         step = 1e-6 * 8.0 ** (0.3 - 0.8)
         smooth = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.8, rms_increment=step, rng=100 + seed).values
         found = estimate_one(surface_of(rough + smooth, 1e-4))
         held.append(bool(found.ci_low <= 0.3 <= found.ci_high))
-    assert sum(held) >= 5
+    assert sum(held) >= least
 
 
 @pytest.mark.parametrize(
