@@ -32,8 +32,6 @@ from fractalcontact.base.process import block_dask_import, collect_rarely
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
-SOFTEST = 1e4  # Pa: below the softest gels; a modulus below it is in another unit
-WEAKEST = 1e4  # Pa: below the weakest clays; a strength below it is in another unit
 TEMPLATE_ARGUMENTS = (  # of `scenes.template`; options of these names give them
     "spacing", "units", "level", "despike", "young", "poisson", "register", "turn_upper", "friction_angle",
     "wall_strength",
@@ -232,13 +230,14 @@ def _answer(options: argparse.Namespace) -> int:
         stem = first.resolve().parent.name.replace("*", "") if several else first.name.partition(".")[0]
         folder = f"{stem}_{options.question}"
     arguments = {name: getattr(options, name) for name in TEMPLATE_ARGUMENTS if hasattr(options, name)}
-    if arguments.get("young", SOFTEST) < SOFTEST:
-        message = f"--young: {options.young:g} Pa is softer than any solid; is it {options.young:g} GPa?"
-        warnings.warn(message, ScaleWarning, stacklevel=2)
-    strength = arguments.get("wall_strength")
-    if strength is not None and strength < WEAKEST:
-        message = f"--jcs: {strength:g} Pa is weaker than any rock; is it {strength:g} MPa?"
-        warnings.warn(message, ScaleWarning, stacklevel=2)
+    for name, option, what, unit in (
+        ("young", "--young", "softer than any solid", "GPa"),
+        ("wall_strength", "--jcs", "weaker than any rock", "MPa"),
+    ):
+        value = arguments.get(name)
+        if value is not None and value < 1e4:  # Pa: below the softest gels, and the weakest clays
+            message = f"{option}: {value:g} Pa is {what}; is it {value:g} {unit}?"
+            warnings.warn(message, ScaleWarning, stacklevel=2)
     place = "." if options.scene else folder
     if options.question == "roughness" and not options.scene and not several:
         from fractalcontact import surfaces

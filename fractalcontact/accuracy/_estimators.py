@@ -37,10 +37,6 @@ REFERENCES = "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1
 SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
 ROLLOFF = 8.0  # edge over the wavelength of the corner of the roll-off
 SPACING, HEIGHT = 1e-4, 1e-6  # m: no result depends on them
-BATCH = 1 << 22  # points generated at a time: heights of 32 MB
-MARK, MARK_ANGLE = 7.0, 0.5  # wavelength in spacings and azimuth, radian, of an oblique wave
-MEMBER_POINTS = 25600  # members times points along an edge: coverage to within 1, 2, 4 % at 64, 256, 1024
-LEVEL = 0.95  # of the intervals of `dimensions.estimate`, and of those of this table
 
 DIMS = ("method", "family", "hurst", "size")
 SAME = (*DIMS, "member_count", "blur", "noise", "marks")
@@ -179,7 +175,7 @@ def estimators(
 
 def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[int]:
     if members is None:
-        return [max(10, MEMBER_POINTS // size) for size in sizes]
+        return [max(10, 25600 // size) for size in sizes]  # coverage to within 1, 2, 4 % at 64, 256, 1024
     counts = [int(count) for count in np.atleast_1d(members).tolist()]
     return counts if len(counts) == len(sizes) else counts[:1] * len(sizes)
 
@@ -300,8 +296,9 @@ def _with_defects(
         scatter = stream.standard_normal(result.shape)
         result = result + defects["noise"] * HEIGHT * scatter
     if defects["marks"]:
-        along = np.cos(MARK_ANGLE) * result.x + (np.sin(MARK_ANGLE) * result.y if "y" in result.dims else 0.0)
-        waves = np.cos(2.0 * np.pi / MARK / SPACING * along).transpose(*result.dims[1:])
+        azimuth = 0.5  # radian: oblique to both axes
+        along = np.cos(azimuth) * result.x + (np.sin(azimuth) * result.y if "y" in result.dims else 0.0)
+        waves = np.cos(2.0 * np.pi / 7.0 / SPACING * along).transpose(*result.dims[1:])  # 7 spacings long
         result = result + defects["marks"] * HEIGHT * waves
     return result
 
@@ -316,7 +313,7 @@ def _sample(
     stream: Stream,
 ) -> Array:
     """Return exponent, lower end, upper end and seconds of every estimate, (4, members, methods)."""
-    batch = max(1, min(count, BATCH // (n * n)))
+    batch = max(1, min(count, (1 << 22) // (n * n)))  # heights of 32 MB at a time
     parts = []
     for start in range(0, count, batch):
         ensemble = _surfaces(family, hurst, n, min(batch, count - start), defects, stream)
@@ -328,15 +325,18 @@ def _sample(
 
 
 def _scores(
-    truth: float, bound: float, exponents: Array, low: Array, high: Array, seconds: Array
+    truth: float, bound: float, exponents: Array, low: Array, high: Array, seconds: Array, level: float = 0.95
 ) -> dict[str, float]:
-    """Return bias, error, coverage and time of one method on the surfaces of one case."""
+    """Return bias, error, coverage and time of one method on the surfaces of one case.
+
+    `level` is that of the intervals of error and coverage.
+    """
     scores = {"run_time": float(np.median(seconds))}
     errors = exponents[np.isfinite(exponents)] - truth
     if errors.size:
         rms = float(np.sqrt(np.mean(errors**2)))
         # the interval is that of Gaussian errors
-        ends = np.sqrt(errors.size / chi2.ppf([0.5 + LEVEL / 2, 0.5 - LEVEL / 2], errors.size))
+        ends = np.sqrt(errors.size / chi2.ppf([0.5 + level / 2, 0.5 - level / 2], errors.size))
         scores |= {
             "bias": float(errors.mean()),
             "rms_error": rms,
@@ -348,7 +348,7 @@ def _scores(
     scores["interval_share"] = float(has_interval.mean())
     if has_interval.any():
         hits, count = int(np.count_nonzero((low <= truth) & (truth <= high))), int(has_interval.sum())
-        interval = binomtest(hits, count).proportion_ci(LEVEL)
+        interval = binomtest(hits, count).proportion_ci(level)
         scores |= {
             "interval_coverage": hits / count,
             "interval_coverage_low": float(interval.low),

@@ -22,7 +22,6 @@ from fractalcontact.base.validation import Problems, word_tuple
 
 WHERE = "fractalcontact.accuracy.measure"
 REPEATS = 3  # further calls of a setting; the shortest counts, so that other work on the machine matters less
-GROWTH = 2.0  # of the time from one setting to the next: sizes double, tolerances fall by ten
 
 
 class Setting(NamedTuple):
@@ -147,7 +146,8 @@ def _measure_method(benchmark: Benchmark, method: Method, share: float, stop: St
         if not settings:  # what is compiled, or set up once for all settings, does not come again
             elapsed = min(elapsed, (REPEATS + 2) * setting.run_time)
         settings.append(setting)
-        spent, expected = spent + elapsed, GROWTH * elapsed
+        # the next setting takes twice as long: sizes double, tolerances fall by ten
+        spent, expected = spent + elapsed, 2.0 * elapsed
     return settings
 
 

@@ -23,7 +23,7 @@ MEASURED = {
 }
 ESTIMATED = {
     **dict.fromkeys(("bias", "error_ratio", "interval_coverage", "run_time"), _CASE),
-    "least_error": _CASE[1:],
+    "least_error": ("family", "hurst", "size"),
     "member_count": ("size",),
     **{name: (name,) for name in _CASE},
 }

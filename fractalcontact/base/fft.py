@@ -21,12 +21,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALL = 1 << 16  # elements up to which a transform is a single call of ducc0: too few for two threads
 GROUP = 16  # lines: a multiple of the number that ducc0 transforms together
-# bytes of the rows that are copied and transformed at a time: 2^14 to 2^22 take the same time within 2 % at
-# 1024 and 2048 points, 2^14 takes 8 % longer at 256
-CHUNK = 1 << 18
-# Rows a multiple of this apart compete for the same few lines of the first-level cache. ducc0 writes 16 rows
-# of single precision at a time: at 1024 points or more in a row that takes three times as long.
-CONFLICT, SHIFT = 4096, 16  # bytes; elements by which the rows of a buffer are longer
 
 
 def library() -> str:
@@ -237,9 +231,12 @@ def _lines(start: int, stop: int, lines: int) -> slice:
     return slice(start * GROUP, lines if stop >= _groups(lines) else stop * GROUP)
 
 
-def _chunks(start: int, stop: int, lines: int, line_bytes: int) -> Iterator[slice]:
-    """Yield the lines of the groups from `start` to `stop`, some groups at a time."""
-    step = max(1, CHUNK // (GROUP * line_bytes))
+def _chunks(start: int, stop: int, lines: int, line_bytes: int, size: int = 1 << 18) -> Iterator[slice]:
+    """Yield the lines of the groups from `start` to `stop`, some groups of so many bytes at a time.
+
+    Sizes of 2^14 to 2^22 take the same time within 2 % at 1024 and 2048 points, 2^14 takes 8 % longer at 256.
+    """
+    step = max(1, size // (GROUP * line_bytes))
     for first in range(start, stop, step):
         yield _lines(first, min(first + step, stop), lines)
 
@@ -261,10 +258,14 @@ def _transform_rows(start: int, stop: int, plane: Array, width: int, modes: Arra
 
 
 def _undo_rows(start: int, stop: int, modes: Array, width: int, out: Array) -> None:
-    """Transform groups of rows back, and crop them."""
+    """Transform groups of rows back, and crop them.
+
+    Rows a multiple of 4096 bytes apart compete for the same few lines of the first-level cache. ducc0 writes
+    16 rows of single precision at a time: at 1024 points or more in a row that takes three times as long.
+    """
     (ny, nx), call = out.shape, _ducc0().c2r
     options = {"axes": (1,), "lastsize": width, "forward": False, "inorm": 2, "nthreads": 1}
-    conflicts = out.itemsize < np.dtype(np.float64).itemsize and out.strides[0] % CONFLICT == 0
+    conflicts = out.itemsize < np.dtype(np.float64).itemsize and out.strides[0] % 4096 == 0
     if nx == width and not conflicts:
         part = _lines(start, stop, ny)
         call(modes[part], out=out[part], **options)
@@ -273,7 +274,7 @@ def _undo_rows(start: int, stop: int, modes: Array, width: int, out: Array) -> N
     for part in _chunks(start, stop, ny, width * out.itemsize):
         count = part.stop - part.start
         if len(buffer) < count:
-            buffer = np.empty((count, width + SHIFT), dtype=out.dtype)
+            buffer = np.empty((count, width + 16), dtype=out.dtype)  # rows not so far apart
         rows = buffer[:count, :width]
         call(modes[part], out=rows, **options)
         out[part] = rows[:, :nx]

@@ -22,13 +22,7 @@ from typing import Any, NamedTuple
 from fractalcontact.base.errors import TooLittleMemory, UnreadableFile
 from fractalcontact.base.threads import openblas_threads
 
-NEGLIGIBLE = 1 << 25  # bytes that a call takes without a look at the limits, which takes .5 ms
-SMALL_FILE = 1 << 28  # bytes that any file may unpack to: about what the libraries take (`LIBRARIES`)
-# bytes that NumPy, SciPy, Numba and matplotlib take as they are loaded, as `ulimit -v` (address space) and
-# `ulimit -d` (data) count them. OpenBLAS, of which NumPy and SciPy have a copy each, takes more for every
-# further thread; where that does not fit, it ends the process or tries for ever.
-LIBRARIES = {"-v": 6.1e8, "-d": 2.3e8}
-OPENBLAS_THREAD = 8.4e7
+SMALL_FILE = 1 << 28  # bytes that any file may unpack to: about what the libraries take
 PLANES = ("surface", "crack", "mask", "gap", "heights")  # arguments that have a grid
 # arguments of several values, each of which gives a map
 PATHS = ("closure", "normal_force", "nominal_pressure", "tangential_force", "shear", "direction")
@@ -93,10 +87,15 @@ def _free_of_process(root: Path) -> Iterator[Free]:
 
 
 def _libraries(option: str) -> float:
-    """Return the bytes that the libraries take, as `ulimit` counts them; 0 where they are loaded."""
+    """Return the bytes that NumPy, SciPy, Numba and matplotlib take as they are loaded; 0 where they are.
+
+    As `ulimit -v` (address space) and `ulimit -d` (data) count them, measured. OpenBLAS, of which NumPy and
+    SciPy have a copy each, takes more for every further thread; where that does not fit, it ends the process
+    or tries for ever.
+    """
     if "numba" in sys.modules:
         return 0.0
-    return LIBRARIES[option] + OPENBLAS_THREAD * (openblas_threads() - 1)
+    return (6.1e8 if option == "-v" else 2.3e8) + 8.4e7 * (openblas_threads() - 1)
 
 
 def require_libraries() -> None:
@@ -161,7 +160,7 @@ def in_words(size: float) -> str:
 
 def require_memory(where: str, needed: float, what: str) -> None:
     """Raise `TooLittleMemory` unless `needed` bytes may be taken."""
-    if needed <= NEGLIGIBLE:
+    if needed <= 1 << 25:  # a look at the limits takes .5 ms
         return
     free = free_memory()
     if not needed <= free.size:

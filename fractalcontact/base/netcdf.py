@@ -33,9 +33,6 @@ from fractalcontact.base.validation import Problems, reading
 
 SAVE = "fractalcontact.save"
 PARTIAL = ".partial"
-LONGEST_NAME = 255  # bytes, of a variable, a dim or an attribute
-RATIO = 250  # size in memory over that of a large file; contact maps are packed to a hundredth
-FULL_DISK = 1 << 16  # bytes: a disk with less free space counts as full
 # attributes by which a file is unpacked as it is read; left by another reader, they would change the values
 PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
 _TYPE = "fractalcontact_kind"
@@ -231,21 +228,21 @@ def _check_words(problems: Problems, path: str, dataset: xr.Dataset) -> None:
     place = f"result.{group}/" if group else "result."
     owners = {"": dataset.attrs} | {f"{key}.": value.attrs for key, value in dataset.variables.items()}
     for name in [*dataset.variables, *(dim for dim in dataset.dims if dim not in dataset.variables)]:
-        expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
-        problems.require(_is_name(name), f"{place}name of a variable or dim", expected, name)
+        _require_name(problems, f"{place}name of a variable or dim", name)
     for owner, attributes in owners.items():
         for key, value in attributes.items():
             if owner and key in PACKING:
                 expected = "values that are unpacked, without this attribute of a file"
                 problems.add(f"{place}{owner}{key}", expected, value)
-            expected = f"a name of 1 to {LONGEST_NAME} bytes without '/'"
-            problems.require(_is_name(key), f"{place}{owner}name of an attribute", expected, key)
+            _require_name(problems, f"{place}{owner}name of an attribute", key)
             expected = "text, a number or a list of them"
             problems.require(_is_attribute(value), f"{place}{owner}{key}", expected, value)
 
 
-def _is_name(name: object) -> bool:
-    return isinstance(name, str) and "/" not in name and 0 < len(name.encode()) <= LONGEST_NAME
+def _require_name(problems: Problems, place: str, name: object) -> None:
+    """Note a name that a NetCDF file cannot hold, or just can: NC_MAX_NAME is 256 bytes."""
+    is_name = isinstance(name, str) and "/" not in name and 0 < len(name.encode()) <= 255
+    problems.require(is_name, place, "a name of 1 to 255 bytes without '/'", name)
 
 
 def _is_attribute(value: object) -> bool:
@@ -303,7 +300,7 @@ def _read(path: Path, dims: frozenset[str] = frozenset()) -> dict[str, xr.Datase
     groups = {}
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
         unpacked = sum(_unpacked_size(group) for group in _groups(file))
-        limit = unpacked_limit(path.stat().st_size, RATIO)
+        limit = unpacked_limit(path.stat().st_size, 250)  # contact maps are packed to a hundredth
         require_unpacked("fractalcontact.open", path.name, unpacked, limit)
         for group in _groups(file):
             store = NetCDF4DataStore(file, group=group.path, lock=False)  # type: ignore[no-untyped-call]
@@ -371,7 +368,7 @@ def _groups(group: Any) -> Iterator[Any]:
 def _failure_reason(folder: Path, error: Exception) -> str:
     """Return why a file could not be written, in the words of the system if it has any."""
     with contextlib.suppress(OSError):
-        if shutil.disk_usage(folder).free < FULL_DISK:
+        if shutil.disk_usage(folder).free < 1 << 16:  # bytes: so little counts as full
             return "no space left on the device"
     reason = getattr(error, "strerror", None) or str(error)
     return reason if isinstance(error, OSError) else f"the file could not be completed ({reason})"

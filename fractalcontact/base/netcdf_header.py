@@ -23,7 +23,6 @@ from fractalcontact.base.validation import Problems, reading
 DAMAGED = "is damaged, or is not a complete NetCDF file"
 _MARK = b"\nCRC-32 of the bytes before this line: "
 _LENGTH = len(_MARK + b"00000000\n")
-_LEAST = 8  # bytes of the line by which one that was cut off is known: eight arbitrary ones are never these
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def require_checksum(where: str, path: Path) -> None:
     with path.open("rb") as file:
         file.seek(max(size, 0))
         written = file.read(_LENGTH)
-    start = written.rfind(_MARK[:_LEAST])
+    start = written.rfind(_MARK[:8])  # of a line that was cut off: eight arbitrary bytes are never these
     is_whole = start == 0 and written.startswith(_MARK)
     if start > 0 or (is_whole and written != _line(path, size)):  # cut off in the line, or other bytes
         fault = "is damaged: its bytes differ from those that were written (checksum)"

@@ -24,7 +24,6 @@ from fractalcontact.base.schema import CONVENTIONS
 from fractalcontact.base.study import MEMBER
 from fractalcontact.base.threads import thread_count
 
-LONGEST_TABLE = 64  # numbers of a table of more than one dim that are written
 LOADS = ("closure", "normal_force", "nominal_pressure")
 SHARED = "pressed"  # the argument of which every part takes what it needs: the whole is that of any part
 # the arguments of a call that grow where results are joined along a dim
@@ -100,7 +99,7 @@ def plain(value: Any) -> Any:
             summary["provenance"] = _read(value.attrs["provenance"])
         return summary
     if isinstance(value, np.ndarray):
-        if value.ndim > 1 and value.size > LONGEST_TABLE:
+        if value.ndim > 1 and value.size > 64:  # no small table, but a map
             return {"shape": list(value.shape), "dtype": str(value.dtype)}
         return plain(value.tolist())
     if isinstance(value, np.generic):

@@ -29,7 +29,6 @@ import xarray as xr
 
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, LoadedWarning, TooLittleMemory, warn
 from fractalcontact.base.memory import (
-    NEGLIGIBLE,
     Estimate,
     has_blocks,
     loaded_bytes,
@@ -49,10 +48,9 @@ MASKS = ("mask", "masks", "valid")
 P = ParamSpec("P")
 R = TypeVar("R", xr.Dataset, xr.DataArray)
 R_co = TypeVar("R_co", covariant=True)
-PLACES_SHOWN = 5  # in a warning
+ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 WORK = {"transforms": "pairs of transforms", "iterations": "iterations"}
 NO_REASONS: Mapping[str, str] = {}
-ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 
 
 class PublicFunction(Protocol[P, R_co]):
@@ -136,8 +134,7 @@ def public_result(
                 if check is not None:
                     check(problems)
             needed = peak_of(memory, bound.arguments, in_blocks=in_blocks)
-            if needed > NEGLIGIBLE:
-                require_memory(name, needed, _size_of(bound.arguments))
+            require_memory(name, needed, _size_of(bound.arguments))
             return bound, done
 
         @wraps(function)
@@ -178,13 +175,13 @@ def public_result(
     return decorate
 
 
-def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray) -> None:
-    """Warn of the values that `converged` marks: where they are, why, and how far they came."""
+def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray, most: int = 5) -> None:
+    """Warn of the values that `converged` marks: where the first are, why, and how far they came."""
     if not isinstance(result, xr.Dataset) or "converged" not in result or result["converged"].values.all():
         return
     converged = result["converged"]
     failed, shown = np.argwhere(~converged.values), []
-    for index in failed[:PLACES_SHOWN].tolist():
+    for index in failed[:most].tolist():
         where = dict(zip(converged.dims, index, strict=True))
         at = result.isel(where)
         values = {dim: at[dim].item() if dim in at.coords else i for dim, i in where.items()}
@@ -196,7 +193,7 @@ def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray) -> None:
         error = f"(residual {float(at['residual']):.2g})" if "residual" in at else ""
         place = f"{', '.join(places)}: " if places else ""
         shown.append(place + " ".join(filter(None, [reason, work, error])))
-    more = f"; and {len(failed) - PLACES_SHOWN} more" if len(failed) > PLACES_SHOWN else ""
+    more = f"; and {len(failed) - most} more" if len(failed) > most else ""
     warn(f"{name}: not converged: {'; '.join(shown)}{more}", ConvergenceWarning)
 
 

@@ -11,7 +11,6 @@ from fractalcontact.base.numbers import is_real
 from fractalcontact.base.validation import Problems
 
 STREAMS = (np.random.Generator, np.random.BitGenerator, np.random.SeedSequence)
-LARGEST_SEED = 1 << 8192  # Python writes integers of up to 4300 digits
 
 RNGLike = (
     np.random.Generator
@@ -57,7 +56,7 @@ def _stream(rng: Any) -> np.random.Generator | None:
 def _is_seed(value: Any) -> bool:
     """Return whether a value is an integer that a record can state."""
     integer = is_real(value) and isinstance(value, (int, np.integer))
-    return integer and 0 <= value < LARGEST_SEED
+    return integer and 0 <= value < 1 << 8192  # Python writes integers of up to 4300 digits
 
 
 def record(rng: np.random.Generator) -> dict[str, Any]:

@@ -41,7 +41,6 @@ class Quantity:
 
 STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
 DEFAULT_TOLERANCE = 1e-8  # of a contact; from 1e-5 on the area is that of the solution (page theory_contact)
-SMALL = 4096  # bytes of a variable other than a map, up to which compression saves no space
 
 
 def _flags(meanings: str, first: int = 0) -> dict[str, Any]:
@@ -633,7 +632,7 @@ def _encoding(variable: xr.Variable, *, is_coordinate: bool) -> dict[str, Any]:
     if is_coordinate or not variable.ndim:
         return encoding
     is_map = variable.dims[-2:] == CORE_DIMS
-    if is_map or variable.nbytes > SMALL:
+    if is_map or variable.nbytes > 4096:  # compression saves no space in a smaller variable
         encoding.update(zlib=True, complevel=4, shuffle=True, fletcher32=True)
         if is_map:
             encoding["chunksizes"] = (1,) * (variable.ndim - 2) + variable.shape[-2:]

@@ -11,7 +11,6 @@ from types import FrameType
 from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
-ECHO = 0.5  # seconds in which a signal counts as a repetition: `timeout` and terminals may send it twice
 
 
 class Stop:
@@ -49,11 +48,11 @@ Handler = Callable[[int, FrameType | None], object]
 
 
 @contextmanager
-def noted(enabled: bool = True) -> Iterator[Stop]:
+def noted(enabled: bool = True, *, echo: float = 0.5) -> Iterator[Stop]:
     """Record SIGINT and SIGTERM inside the block instead of acting on them.
 
-    A second signal, at least `ECHO` after the first, has its usual effect. Outside the main thread, or if not
-    `enabled`, signals keep their handlers.
+    A second signal has its usual effect, unless it comes within `echo` seconds of the first: `timeout` and
+    terminals may send one twice. Outside the main thread, or if not `enabled`, signals keep their handlers.
     """
     stop, first = Stop(), 0.0
 
@@ -61,7 +60,7 @@ def noted(enabled: bool = True) -> Iterator[Stop]:
         nonlocal first
         if not stop:
             stop.number, first = number, time.monotonic()
-        elif time.monotonic() - first > ECHO:
+        elif time.monotonic() - first > echo:
             _set(before)
             signal.raise_signal(number)
 

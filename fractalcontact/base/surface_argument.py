@@ -20,7 +20,6 @@ from fractalcontact.base.validation import Problems, float_array
 SURFACE, SPACING = "surface", "spacing"
 MASK, VALID = "mask", "valid"
 MASK_DIMS = ("step", "y", "x")  # of a plain array; of one row of cells (x,)
-WIDE = 20.0  # m: a surface without units that is wider may be in millimetres
 
 
 def usual_arguments(where: str, arguments: dict[str, Any], spacing: Any = None) -> str:
@@ -77,7 +76,7 @@ def _warn_of_unit(where: str, value: xr.DataArray, core: tuple[str, ...]) -> Non
         if axis is None or "units" in axis.attrs or axis.dtype.kind not in "fiu" or axis.size < 2:
             continue
         extent = abs(float(axis.values[-1]) - float(axis.values[0]))
-        if WIDE < extent < np.inf:
+        if 20.0 < extent < np.inf:  # m: a wider surface may be in millimetres
             message = (
                 f"{where}: {dim} extends over {extent:.3g} and states no unit, so it is taken as metres; if "
                 f"it is in millimetres, set surface.{dim}.attrs['units'] = 'mm' (also of the heights), else "

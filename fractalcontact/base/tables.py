@@ -11,8 +11,6 @@ from html import escape
 
 from tabulate import tabulate
 
-WIDTH = 110  # where the output is no terminal
-WORD = 24  # characters: a longer word may be broken
 GAP = 2  # spaces that tabulate puts between columns
 GLUE = "\N{NO-BREAK SPACE}"  # between number and unit while cells are wrapped
 # the spaces of a quantity; where these make a table too wide, it may break before its ±
@@ -20,8 +18,8 @@ QUANTITY = (r"(?<=\d) (?=[±µ%°A-Za-z])|(?<=±) ", r"(?<=\d) (?=[µ%°A-Za-z])
 
 
 def screen_width() -> int:
-    """Return the width of the terminal, which the environment variable COLUMNS overrides."""
-    return shutil.get_terminal_size(fallback=(WIDTH, 24)).columns
+    """Return the width of the terminal, which the environment variable COLUMNS overrides; 110 of a file."""
+    return shutil.get_terminal_size(fallback=(110, 24)).columns
 
 
 def table(rows: Sequence[Sequence[str]], width: int | None = None, *, rule: bool = True) -> str:
@@ -78,8 +76,9 @@ def _total(widths: Sequence[int]) -> int:
     return sum(widths) + GAP * (len(widths) - 1)
 
 
-def _longest_word(cell: str) -> int:
-    return min(WORD, max((len(word) for word in re.split(r" |(?<=-)", cell)), default=0))
+def _longest_word(cell: str, most: int = 24) -> int:
+    """Return the length of the longest word of a cell; one of more than `most` characters may be broken."""
+    return min(most, max((len(word) for word in re.split(r" |(?<=-)", cell)), default=0))
 
 
 @dataclass(frozen=True)

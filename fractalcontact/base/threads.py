@@ -17,7 +17,6 @@ from typing import Any
 
 SHARE = 32768  # elements worth a thread of their own: a transform takes 33 us, to hand it over 17 us
 LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
-MOST_OPENBLAS = 64  # threads for which the wheels of NumPy and SciPy are built
 NAME = "fractalcontact"  # of the threads that wait for bands
 # matplotlib is not safe in threads: its parser of formulas is shared, and so are its settings
 DRAWING_LOCK = threading.RLock()
@@ -39,11 +38,11 @@ def requested_count() -> int | None:
     return _environment_count("FRACTALCONTACT_THREADS")
 
 
-def openblas_threads() -> int:
-    """Return the number of threads that OpenBLAS has once NumPy or SciPy loads it."""
+def openblas_threads(most: int = 64) -> int:
+    """Return the number of threads that OpenBLAS has once NumPy or SciPy loads it, whose wheels have 64."""
     counts = (_environment_count(name) for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"))
-    chosen = next((count for count in counts if count is not None), MOST_OPENBLAS)
-    return min(chosen, _available_processors(), MOST_OPENBLAS)
+    chosen = next((count for count in counts if count is not None), most)
+    return min(chosen, _available_processors(), most)
 
 
 def _environment_count(name: str) -> int | None:

@@ -13,10 +13,8 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PREFIXES = {
     18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
 }  # fmt: skip
-SMALLEST = 0.5  # the largest value is at least this many of the shown units (0.05 m2, 0.005 m3)
 PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
 PRESSURE = re.compile(r"^\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*$")
-OF_PASCAL = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -53,7 +51,8 @@ def scale_for(units: str, values: Any) -> Scale:
     largest = _largest(values)
     if largest == 0:
         return Scale(1.0, raise_exponents(units))
-    smallest = SMALLEST * 0.1 ** (power - 1)  # 0.2 mm2, not 200 000 um2
+    # the largest value is at least .5 of the shown units, .05 m2, .005 m3: 0.2 mm2, not 200 000 um2
+    smallest = 0.5 * 0.1 ** (power - 1)
     fitting = [e for e in PREFIXES if largest >= smallest * 10.0 ** (e * power)]
     exponent = max(fitting) if fitting else min(PREFIXES)
     if units == "s":
@@ -110,8 +109,9 @@ def pascals(text: str) -> float | None:
     (30000000000.0, 2000000.0, None)
     """
     parts = PRESSURE.match(text)
+    powers = {prefix: power for power, prefix in PREFIXES.items()}
     try:
-        return float(parts[1]) * OF_PASCAL[parts[2]] if parts else None
+        return float(parts[1]) * 10.0 ** powers[parts[2]] if parts else None
     except ValueError:
         return None
 

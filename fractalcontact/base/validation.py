@@ -48,7 +48,6 @@ COMPARISONS = {
     "at_most": ("<=", np.less_equal),
 }
 LARGEST_INTEGER = 1 << 53  # larger integers are not all representable as float64
-LONGEST_NAME, LONGEST_PATH = 255, 4096  # bytes of a file name and of a path that file systems hold
 
 
 class Words(str):
@@ -273,8 +272,8 @@ class Problems:
         except UnicodeEncodeError:
             return self.require(False, argument, f"{what}, in letters that Unicode has", ascii(text))
         longest = max(map(len, name.split(b"/")))
-        fits = longest <= LONGEST_NAME and len(name) < LONGEST_PATH
-        return self.require(fits, argument, f"names of at most {LONGEST_NAME} bytes", f"{longest} bytes")
+        fits = longest <= 255 and len(name) < 4096  # what file systems hold (NAME_MAX, PATH_MAX)
+        return self.require(fits, argument, "names of at most 255 bytes", f"{longest} bytes")
 
     def file(self, argument: str, value: Any = GIVEN, *, what: str = "an existing file") -> bool:
         """Check for the path of a regular file that may be read; a device or a pipe is none."""

@@ -97,13 +97,12 @@ def test_partial_file_has_the_finished_part_of_a_stage(uninterrupted, tmp_path, 
     assert "domains/islands" in partial.attrs["completeness"]
 
 
-def test_second_signal_stops_at_once(tmp_path, monkeypatch):
+def test_second_signal_stops_at_once():
     from fractalcontact.base import signals
 
-    monkeypatch.setattr(signals, "ECHO", 0.0)
     # a job in the background inherits a SIGINT that is ignored, and would go on ignoring it
     usual = signals.leaving(signal.default_int_handler)
-    with pytest.raises(KeyboardInterrupt) as caught, usual, signals.noted() as stop:
+    with pytest.raises(KeyboardInterrupt) as caught, usual, signals.noted(echo=0.0) as stop:
         signal.raise_signal(signal.SIGINT)
         assert stop.number == signal.SIGINT
         time.sleep(0.001)

@@ -11,6 +11,9 @@ import numpy as np
 from fractalcontact.base.numbers import Array as Array
 
 POINTS, TOLERANCE = "points along an edge", "tolerance"
+TOLERANCES = tuple(10.0**-k for k in range(2, 11))
+EXACT = 1e-13  # tolerance of a solution to rounding
+HURST = 0.7  # of the fractional Brownian surfaces
 
 
 def root_mean_square(errors: Array, axis: int) -> Array:

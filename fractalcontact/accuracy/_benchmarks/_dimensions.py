@@ -9,12 +9,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import dimensions, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import Array, Benchmark, Method
+from fractalcontact.accuracy._benchmarks._benchmark import HURST, Array, Benchmark, Method
 
 Problem = tuple[xr.DataArray, dict[str, Any]]  # an ensemble of surfaces, options of the estimator
 
-HURST, MEMBERS = 0.7, 12
-NOISE = 0.1  # variance over half the variogram at lag 1
+MEMBERS = 12
 SIZES = (32, 64, 128, 256, 512)
 WINDOW_SIZE = 256
 
@@ -25,9 +24,10 @@ def benchmarks() -> tuple[Benchmark, ...]:
     exact = "exact fractional Brownian surfaces"
     default = next(iter(dimensions.methods()))
     clean = tuple(_method(name, name, SIZES) for name in dimensions.methods())
+    noise = 0.1  # variance over half the variogram at lag 1
     noisy = (
-        _method(f"{default}, noise modelled", default, SIZES[:4], NOISE),
-        _method(f"{default}, noise ignored", default, SIZES[:4], NOISE, {"noise": 0.0}),
+        _method(f"{default}, noise modelled", default, SIZES[:4], noise),
+        _method(f"{default}, noise ignored", default, SIZES[:4], noise, {"noise": 0.0}),
     )
     directional = Method("by direction", SIZES[:4], _surfaces, _first_directions, _directional_errors)
     windows = Method(
@@ -43,7 +43,7 @@ def benchmarks() -> tuple[Benchmark, ...]:
         Benchmark(
             "Hurst exponent under noise",
             error,
-            f"exact surfaces and white noise of {NOISE:.0%} of half the variogram at lag 1",
+            f"exact surfaces and white noise of {noise:.0%} of half the variogram at lag 1",
             noisy,
             equal_parameters=True,
         ),

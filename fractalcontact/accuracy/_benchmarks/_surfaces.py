@@ -11,15 +11,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import Array, Benchmark, Method
+from fractalcontact.accuracy._benchmarks._benchmark import HURST, Array, Benchmark, Method
 
 Generator = Callable[..., xr.DataArray]
 
-HURST = 0.7
-SIZES = (32, 64, 128, 256, 512, 1024)
 ROLLOFF, SHORT = 0.5, 4.0  # of the extent; in spacings
-_POINTS, _FEWEST = 1 << 18, 100  # points, and surfaces, of the ensemble over which the error is taken
-_BATCH = 1 << 22  # points that are generated at a time
 
 
 def benchmarks() -> tuple[Benchmark, ...]:
@@ -63,7 +59,8 @@ def _method(name: str, make: Generator, measure: Callable[[Array], Array]) -> Me
 
     def measured_ensemble(_: Any, parameter: float) -> Array:
         n = int(parameter)
-        count, batch = max(_FEWEST, _POINTS // n**2), max(1, _BATCH // n**2)
+        # the error is that over 2^18 points, or a hundred surfaces; 2^22 points are generated at a time
+        count, batch = max(100, (1 << 18) // n**2), max(1, (1 << 22) // n**2)
         rng = np.random.default_rng(1)
         replicates: list[Array] = []
         while len(replicates) < count:
@@ -71,7 +68,7 @@ def _method(name: str, make: Generator, measure: Callable[[Array], Array]) -> Me
             replicates += [measure(heights) for heights in ensemble.values]
         return np.array(replicates)
 
-    return Method(name, SIZES, int, solve, measured_ensemble)
+    return Method(name, (32, 64, 128, 256, 512, 1024), int, solve, measured_ensemble)
 
 
 def _with_increments(name: str, n: int, **options: Any) -> xr.DataArray:
