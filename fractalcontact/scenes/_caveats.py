@@ -19,11 +19,6 @@ from fractalcontact.scenes._result_tables import length
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-ISOLATED = 0.05  # of the area: less is lost in the pressure beside it
-MIN_CELLS = 30  # an island of fewer cells has the area and the shape of the grid
-TILTED = 0.5  # of the mean square height that the mean plane carries: more, and a flat touches one edge
-SPIKED_DIMENSION, SPIKED_JRC, SPIKED_LIFT = 0.01, 0.5, 0.1  # changes by spikes that are worth a sentence:
-# half of the usual interval of D, a fortieth of the scale of JRC, a tenth of the opening at first touch
 Rule = Callable[[xr.DataTree], Iterator[str]]
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
 
@@ -108,7 +103,8 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
 
         before = float(estimates["fractal_dimension"].sel({"method": "default"}))
         after = float(dimensions.estimate(clean, **_table(tree, "dimensions"))["fractal_dimension"][0])
-        if not abs(after - before) <= SPIKED_DIMENSION:  # also where there is no D with them, or without
+        # half of the usual interval, also where there is no D with them, or without
+        if not abs(after - before) <= 0.01:
             yield f"D is {fixed(after, 2)}, not {fixed(before, 2)}"
     if jrc is not None:
         from fractalcontact import joints
@@ -116,7 +112,7 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
         direction = [str(name) for name in np.atleast_1d(jrc["direction"].values)]
         values = joints.roughness_coefficient(clean, direction=direction)["roughness_coefficient"].values
         pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
-        if max(abs(after - before) for _, after, before in pairs) > SPIKED_JRC:
+        if max(abs(after - before) for _, after, before in pairs) > 0.5:  # a fortieth of the scale
             words = [(name, jrc_text(after, 0), jrc_text(before, 0)) for name, after, before in pairs]
             text = [
                 f"{after}, not {before}, toward {name}" for name, after, before in words if after != before
@@ -132,14 +128,14 @@ def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterat
         return
     without = clean["upper"].drop_vars("removed_points") - clean["surface"].drop_vars("removed_points")
     before, after = (float(opening.mean() - opening.min()) for opening in (aperture, without))
-    if before - after > SPIKED_LIFT * before:
+    if before - after > 0.1 * before:  # a tenth of the opening is worth a sentence
         yield f"the faces first touch at a mean aperture of {length(after)}, not {length(before)}"
 
 
 def _tilt(tree: xr.DataTree) -> Iterator[str]:
     """Yield that a flat presses a tilted surface at one edge."""
     share = float(tree.attrs.get("plane_share", 0.0))
-    if share > TILTED and group_of(tree, "contact") is not None:
+    if share > 0.5 and group_of(tree, "contact") is not None:  # the flat touches one edge
         yield (
             f"the surface is tilted: its mean plane carries {100 * share:.0f} % of Sq², so that the flat "
             "touches one edge first, and area and closure are those of a wedge. Remedy: level = 1."
@@ -170,13 +166,16 @@ def _median_cells(mask: Array) -> float:
 
 
 @_of_contacts
-def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
-    """Yield at how many loads the contacts have too few cells, and what the grid does to their areas."""
+def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset, least: int = 30) -> Iterator[str]:
+    """Yield at how many loads the contacts have too few cells, and what the grid does to their areas.
+
+    An island of fewer than `least` cells has the area and the shape of the grid.
+    """
     cells = _cells_per_island(pressed)
     others = [dim for dim in cells.dims if dim != "step"]
     low, high = (np.atleast_1d(getattr(cells, end)(others).values) for end in ("min", "max"))
     touching = np.isfinite(low)
-    unresolved = touching & (low < MIN_CELLS)
+    unresolved = touching & (low < least)
     if not unresolved.any():
         return
     greatest = int(np.flatnonzero(unresolved)[-1])
@@ -184,13 +183,13 @@ def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]
     of_loads = f"{int(unresolved.sum())} of {int(touching.sum())} loads"
     source = "" if "state" in pressed else ", from their perimeter"
     where = "every load" if unresolved.sum() == touching.sum() else of_loads
-    ratio = pressed["contact_fraction"] / pressed["corrected_contact_fraction"].where(cells < MIN_CELLS) - 1.0
+    ratio = pressed["contact_fraction"] / pressed["corrected_contact_fraction"].where(cells < least) - 1.0
     excess = float(ratio.where(np.isfinite(ratio)).max())
     counted = (
         f"counted areas are up to {100 * excess:.2g} % above the corrected ones, and " if excess > 0 else ""
     )
     yield (
-        f"{path}: contacts are not resolved at {where} (median island {' to '.join(ends)} cells, {MIN_CELLS} "
+        f"{path}: contacts are not resolved at {where} (median island {' to '.join(ends)} cells, {least} "
         f"needed{source}): {counted}the shapes and the dimension of islands are those of the grid."
     )
 
@@ -257,7 +256,7 @@ def _uplift(tree: xr.DataTree) -> Iterator[str]:
             f"{100 * float(more.max()):.1f} % more uplift."
         )
     isolated = float(water["isolated_fraction"].max())
-    if isolated > ISOLATED:
+    if isolated > 0.05:  # less is lost in the pressure beside it
         yield (
             f"joints/uplift: up to {100 * isolated:.0f} % of the area is open but closed off from the water; "
             "over time it may come there too, and the uplift grow."

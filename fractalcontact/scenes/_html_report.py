@@ -38,16 +38,6 @@ from fractalcontact.scenes._tables import tables
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.scenes.report"
-SURFACE_CELLS = 128  # along the longer side of the surface that can be turned: 44 kB in the page
-MAP_CELLS = 400  # along the longer side of a map, which the page shows 512 pixels wide
-MAPS = 120  # pictures of one set of maps: at 2 bits for each cell no more than 7 MB in the page
-ROWS = 100  # of a table on the page; the CSV file has all
-RELIEF = 0.25  # height range of the drawn surface over its longer side
-NO_HEIGHT = 65535  # of the 16-bit levels: a point without height
-SAME_LOAD = 1e-3  # relative difference of loads that count as one
-QUALITY, EFFORT = 85, 0  # of the figures, as WebP: more effort saves a tenth, in three times the time
-# dark blue, grey, yellow: equally spaced in lightness, told apart by colour-blind readers
-HEIGHT_COLOURS = ((0, 34, 78), (124, 123, 120), (254, 232, 56))
 FLAG_COLOURS = {
     "open": "#f1f1ee",
     "contact": "#0b5394",
@@ -57,7 +47,6 @@ FLAG_COLOURS = {
 }
 OTHER_COLOURS = ("#009e73", "#cc79a7", "#56b4e9", "#f0e442")
 LOADS = {"normal_force": "F", "nominal_pressure": "p", "closure": "w", "tangential_force": "Q"}
-SIZES = (1.0, 2.0, 5.0)  # of a decade, that are written on the axis of d(s)
 PLAIN_LIST = re.compile(r"\[[^\[\]{}\"]*\]")  # in JSON: of numbers, without words, lists or objects
 HIDDEN = ("run_time", "iterations", "stop_reason")  # from the tables on the page
 
@@ -214,12 +203,15 @@ def _scans(tree: xr.DataTree) -> list[str]:
     return [] if overview is None else [str(name) for name in overview[SCAN].values]
 
 
-def _surface(tree: xr.DataTree) -> dict[str, Any] | None:
-    """Return what the page draws of the surface: 16-bit levels, lengths in metres, and words."""
+def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:
+    """Return what the page draws of the surface: 16-bit levels, lengths in metres, and words.
+
+    It has at most `most` points along its longer side: 44 kB in the page.
+    """
     height = _heights(tree)
     if height is None:
         return None
-    block = math.ceil(max(height.shape) / SURFACE_CELLS)
+    block = math.ceil(max(height.shape) / most)
     coarse = height.coarsen(y=block, x=block, boundary="trim").mean() if block > 1 else height
     values = np.asarray(coarse.values, dtype=float)
     known = np.isfinite(values)
@@ -229,15 +221,18 @@ def _surface(tree: xr.DataTree) -> dict[str, Any] | None:
     steps = [float(coarse[dim][1] - coarse[dim][0]) for dim in CORE_DIMS]
     extent = [step * size for step, size in zip(steps, coarse.shape, strict=True)]
     scaled = np.where(known, (values - lowest) / ((highest - lowest) or 1.0), 0.0)
-    levels = np.where(known, np.rint(scaled * (NO_HEIGHT - 1)), NO_HEIGHT).astype("<u2")
+    missing = np.iinfo("<u2").max  # the level of a point without height
+    levels = np.where(known, np.rint(scaled * (missing - 1)), missing).astype("<u2")
     return {
         "heights": base64.b64encode(levels.tobytes()).decode(),
         "shape": list(coarse.shape),
         "extent": extent,
         "lowest": lowest,
         "highest": highest,
-        "exaggeration": RELIEF * max(extent) / (highest - lowest) if highest > lowest else 1.0,
-        "colours": HEIGHT_COLOURS,
+        # drawn a quarter as high as it is wide
+        "exaggeration": 0.25 * max(extent) / (highest - lowest) if highest > lowest else 1.0,
+        # dark blue, grey, yellow: equally spaced in lightness, told apart by colour-blind readers
+        "colours": ((0, 34, 78), (124, 123, 120), (254, 232, 56)),
         "labels": [f"{dim}, {quantity_text(length, 'm')}" for dim, length in zip("yx", extent, strict=True)],
         "block": block,
         "ends": [quantity_text(end, "m") for end in (lowest, highest)],
@@ -274,15 +269,16 @@ def _maps(tree: xr.DataTree) -> Iterator[Maps]:
                 yield _map_set(tree, node.path.strip("/"), node.to_dataset(), str(name))
 
 
-def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str) -> Maps:
+def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most: int = 120) -> Maps:
+    """Return at most `most` maps of a variable: at 2 bits for each cell no more than 7 MB in the page."""
     state = dataset[name]
     dims = [str(dim) for dim in state.dims[:-2]]
-    limit = MAPS if len(dims) < 2 else math.isqrt(MAPS)
+    limit = most if len(dims) < 2 else math.isqrt(most)
     shown = {dim: spread(state.sizes[dim], limit) for dim in dims}
     dataset = dataset.isel(shown)
     state = dataset[name]
     key = _key(state)
-    block = math.ceil(max(state.shape[-2:]) / MAP_CELLS)
+    block = math.ceil(max(state.shape[-2:]) / 400)  # the page shows a map 512 pixels wide
     palette = list(key.values())
     pictures, alternatives = [], []
     for place in np.ndindex(*state.shape[:-2]):
@@ -336,7 +332,7 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
         for both, row in zip(lengths, local.reshape(-1, side.size), strict=True)
     ]  # fmt: skip
     window = across(np.array([signature[name].values for name in ("window_low", "window_high")]))
-    decades = 10.0 ** np.arange(-3, 6)[:, None] * SIZES
+    decades = 10.0 ** np.arange(-3, 6)[:, None] * (1.0, 2.0, 5.0)
     written = [value for value in decades.ravel() if side[0] <= value * scale.factor <= side[-1]]
     rows = table_of(replace(_domain_rows.signature, first_dim=False), tree, signature)
     cells = [list(zip(rows.heads, row, strict=True)) for row in rows.cells] if rows else []
@@ -396,7 +392,8 @@ def _label(dataset: xr.Dataset, dim: str, place: int) -> str:
         for name, symbol in LOADS.items():
             if name in dataset.variables and "step" in dataset[name].dims:
                 values = dataset[name].isel(step=place)
-                if float(values.max() - values.min()) <= SAME_LOAD * abs(float(values.max())):
+                # one load, in the digits that are shown
+                if float(values.max() - values.min()) <= 1e-3 * abs(float(values.max())):
                     return f"{symbol} = {_value(values.max(keep_attrs=True))}"
         return str(place)
     return _value(dataset[dim][place]) if dim in dataset.coords else str(place)
@@ -414,7 +411,8 @@ def _picture_file(path: Path) -> tuple[str, bytes]:
 
     content = io.BytesIO()
     with reading(WHERE, path), Image.open(path) as picture:
-        picture.convert("RGB").save(content, "WEBP", quality=QUALITY, method=EFFORT)
+        # a greater effort (method) saves a tenth, in three times the time
+        picture.convert("RGB").save(content, "WEBP", quality=85, method=0)
     return path.stem, content.getvalue()
 
 
@@ -424,9 +422,9 @@ def _curves(tree: xr.DataTree) -> dict[str, Any]:
     return {name: frame for name, frame in frames if not set(frame.columns) <= {"run_time (s)"}}
 
 
-def _curve_table(name: str, frame: Any) -> dict[str, Any]:
-    """Return the first rows of a table as text, and all of it as CSV."""
-    shown = frame[[column for column in frame.columns if column.split(" (")[0] not in HIDDEN]].head(ROWS)
+def _curve_table(name: str, frame: Any, most: int = 100) -> dict[str, Any]:
+    """Return the first rows of a table as text, at most `most`, and all of it as CSV."""
+    shown = frame[[column for column in frame.columns if column.split(" (")[0] not in HIDDEN]].head(most)
     heads, columns = zip(*(_column(head, shown[head]) for head in shown.columns), strict=True)
     csv = frame.to_csv(index=False, float_format="%.9g").encode()
     return {

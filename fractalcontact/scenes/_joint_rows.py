@@ -12,9 +12,9 @@ from fractalcontact.base.references import provenance_of
 from fractalcontact.base.study import MEMBER, group_of
 from fractalcontact.base.units import jrc_text, number
 from fractalcontact.scenes._result_tables import (
-    ROUNDING,
     Column,
     amount,
+    are_one,
     at_value,
     finite,
     in_turn,
@@ -24,7 +24,6 @@ from fractalcontact.scenes._result_tables import (
 )
 from fractalcontact.scenes._surface_rows import AREAS
 
-WATER = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight of water over its viscosity, at 20 °C
 OUTSIDE_SCALE = (
     "A coefficient outside 0 to 20, the scale of the standard profiles, is extrapolated: it only says that "
     "the face is smoother, or rougher, than all of them."
@@ -108,8 +107,7 @@ faces = rows(
 
 def _last_pressure(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the pressure on the block at the last step, where it is the same for all shears."""
-    pressures = finite(last["nominal_pressure"])
-    if pressures.size and float(np.ptp(pressures)) <= ROUNDING * float(pressures.max()):
+    if are_one(finite(last["nominal_pressure"])):
         yield f"at the last step of the load, {amount(last['nominal_pressure'])} on the area of the block"
 
 
@@ -321,8 +319,9 @@ def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     values = values[values > 0]
     if values.size:
         ends = (float(values.min()), float(values.max()))
+        of_water = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight over viscosity, at 20 °C
         cubes, water = (
-            " to ".join(dict.fromkeys(number(factor * end, 3) for end in ends)) for factor in (1.0, WATER)
+            " to ".join(dict.fromkeys(number(factor * end, 3) for end in ends)) for factor in (1.0, of_water)
         )
         yield (
             f"transmissivity, the hydraulic aperture cubed over 12: {cubes} m³; times unit weight over "

@@ -19,7 +19,6 @@ from fractalcontact.scenes._tables import MAP_DIMS, groups_of, heading
 Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.scenes.export"
-MICROMETRE = 1e-6  # unit of the pixels in TIFF: ImageJ shows lengths in it
 
 
 def export(
@@ -176,7 +175,7 @@ def _tiff_writer(dataset: xr.Dataset, name: str, leading: tuple[str, ...]) -> Ca
             "Labels": [_label(field, leading, index) for index in np.ndindex(*values.shape[:-2])],
             "Info": f"{heading(dataset, name)}: {field.attrs.get('long_name', name)}",
         }
-        resolution = MICROMETRE / dx, MICROMETRE / dy
+        resolution = 1e-6 / dx, 1e-6 / dy  # pixels per unit: ImageJ shows lengths in it
         tifffile.imwrite(path, planes, imagej=True, resolution=resolution, metadata=metadata)
 
     return write

@@ -27,7 +27,6 @@ from fractalcontact.scenes._results_folder import REPORT
 SCANS = "scans"  # folder and group of the single scans
 OVERVIEW = "overview"  # group: a row for every scan
 ERROR = "standard_error"  # of the fractal dimension
-WORDS = 3  # names of scans in a sentence
 JRC, DIMENSION = "roughness_coefficient", "fractal_dimension"
 
 
@@ -183,8 +182,8 @@ def scan_facts(tree: xr.DataTree) -> Iterator[str]:
         yield f"scans with caveats, which their pages state: {_few(caveats)}"
 
 
-def _few(names: object) -> str:
-    """Return the first names, and how many more there are."""
+def _few(names: object, most: int = 3) -> str:
+    """Return the first names, at most `most`, and how many more there are."""
     words = [str(name) for name in names]  # type: ignore[attr-defined]
-    more = f" and {len(words) - WORDS} more" if len(words) > WORDS else ""
-    return ", ".join(words[:WORDS]) + more
+    more = f" and {len(words) - most} more" if len(words) > most else ""
+    return ", ".join(words[:most]) + more

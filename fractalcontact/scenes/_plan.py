@@ -12,8 +12,6 @@ from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stage_memory import stage_memory
 from fractalcontact.scenes._stages import FIGURES, ISLAND_MAP, STAGES, Stage, StageType
 
-WITH_MEMORY = 80  # characters of a screen that holds the table with its column of memory
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -50,7 +48,7 @@ class Plan:
             peak = f"{self.memory[stage.name] / 1e6:.0f} MB" if stage.name in self.memory else "unknown"
             rows.append((name, needs, stage.reason, peak))
         notes = []
-        if screen_width() < WITH_MEMORY:
+        if screen_width() < 80:  # characters: too narrow for the column of memory
             rows = [row[:-1] for row in rows]
             largest = max(self.memory, key=lambda name: self.memory[name], default="")
             notes += [f"peak memory: {self.memory[largest] / 1e6:.0f} MB, {largest}"] if largest else []

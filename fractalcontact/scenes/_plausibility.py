@@ -18,10 +18,6 @@ from fractalcontact.scenes._stages import STAGES
 if TYPE_CHECKING:
     import xarray as xr
 
-LARGEST_SLOPE = 3.0  # rms slope: cracks, grounds and grinds are below 1
-LARGEST_STRAIN = 0.3  # mean pressure over the contact modulus, where strains are no longer small
-LARGEST_CLOSURE = 0.5  # closure over the edge of the body
-
 
 def warn(messages: Iterable[str]) -> None:
     """Warn of every implausible value."""
@@ -42,7 +38,7 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
     """Yield the implausible values of a scene and its surface."""
     spacing = spacing_of(surface)
     slope = _rms_slope(distinct(surface.values), spacing)
-    if slope > LARGEST_SLOPE:
+    if slope > 3.0:  # cracks, grounds and grinds are below 1
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
     edges = [size * step for size, step in zip(surface.shape, spacing, strict=True)]
     if scene.is_pressed:
@@ -67,7 +63,7 @@ def _high_pressures(place: str, loads: Mapping[str, Any], area: float, modulus: 
     for key, scale in (("normal_force", area), ("nominal_pressure", 1.0)):
         if loads.get(key) is not None:
             highest = float(np.max(loads[key])) / scale
-            if highest > LARGEST_STRAIN * modulus:
+            if highest > 0.3 * modulus:  # strains are no longer small
                 yield (
                     f"{place}: {key} gives a mean pressure of {highest:.3g} Pa on a contact modulus of "
                     f"{modulus:.3g} Pa; is one of them in another unit?"
@@ -79,5 +75,5 @@ def implausible_result(name: str, result: xr.Dataset) -> Iterator[str]:
     edge = float(result["nominal_area"].max()) ** 0.5
     if "closure" in result and np.isfinite(result["closure"].values).any():
         deepest = float(np.nanmax(result["closure"].values))
-        if deepest > LARGEST_CLOSURE * edge:
+        if deepest > 0.5 * edge:
             yield f"{name}: a closure of {deepest:.3g} m of a body {edge:.3g} m wide; is the modulus in Pa?"

@@ -21,8 +21,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Remarks = Callable[[xr.DataTree, xr.Dataset], Iterable[str]]
 
 SCAN = "scan"  # the dim of many scans
-WIDE_COLUMN = 1e3  # greatest ratio of the values of a column with one unit
-ROUNDING = 1e-12  # a spread below it is none: the same load for every member
 FRACTIONS = ("contact_fraction", "corrected_contact_fraction", "stick_fraction", "coverage", "largest_share")
 PATHS = ("shear", "step", "nominal_pressure")  # a table without rows along one shows its last value
 # head of the first column of a table, by the dim of its rows, where it is not the name of the dim
@@ -144,10 +142,9 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = 
         values = [_key(dim, state, data, rows) for state in states]
         key_heads.append(KEYS.get(dim, (rows.load if dim == "step" else dim).replace("_", " ")))
         key_cells.append(values)
-    if {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads:
-        pressures = finite(data["nominal_pressure"])
-        if pressures.size and np.ptp(pressures) <= ROUNDING * pressures.max():
-            key_heads[0] += f", at {amount(data['nominal_pressure'])}"
+    has_load = {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads
+    if has_load and are_one(finite(data["nominal_pressure"])):
+        key_heads[0] += f", at {amount(data['nominal_pressure'])}"
     table_keys = tuple(zip(*key_cells, strict=True)) if key_cells else ((),) * len(states)
     remarks = () if screen else tuple(rows.remarks(tree, data))
     rows_of_cells = tuple(zip(*columns.values(), strict=True))
@@ -233,7 +230,7 @@ def column_scale(data: Any) -> Scale | None:
     """Return one unit for a column of a table; None, each value its own, where they span three decades."""
     sizes = np.abs(finite(data))
     sizes = sizes[sizes > 0]
-    if sizes.size == 0 or sizes.max() >= WIDE_COLUMN * sizes.min():
+    if sizes.size == 0 or sizes.max() >= 1e3 * sizes.min():
         return None
     return scale_for(_units_of(data), float(np.median(sizes)))
 
@@ -255,7 +252,7 @@ def _over_members(
     if known.size == 0:
         return "-"
     share = f" ({known.size} of {values.size})" if known.size < values.size else ""
-    if values.ndim == 0 or float(np.ptp(known)) <= ROUNDING * float(np.abs(known).max()):
+    if values.ndim == 0 or are_one(known):
         return text(float(known[0])) + unit + share
     spread = float(np.std(known, ddof=1))
     digits, sign = decimals(spread), text(float(known.mean())).startswith("+")
@@ -287,6 +284,11 @@ def finite(data: Any) -> Array:
     """Return the finite values."""
     values = np.asarray(data.values, dtype=float)
     return np.asarray(values[np.isfinite(values)])
+
+
+def are_one(values: Array) -> bool:
+    """Return whether values are one but for rounding: the same load for every member, for example."""
+    return values.size > 0 and bool(np.ptp(values) <= 1e-12 * np.abs(values).max())
 
 
 def length(value: Any) -> str:

@@ -24,7 +24,6 @@ from fractalcontact.scenes._scene import Scene
 REPORT, DATASHEET, TABLES, CSV = "report.html", "datasheet.pdf", "tables", "scans.csv"
 GENERATOR = 'name="generator" content="fractalcontact'  # of a report, in its head
 SOFTWARE = "fractalcontact"  # of a figure, as its metadata say
-HEAD = 1000  # bytes of a report that hold its head
 REMEDY = "choose another folder, or --force to overwrite"
 
 
@@ -86,7 +85,7 @@ def is_foreign(path: Path) -> bool:
 def is_report(path: Path) -> bool:
     """Return whether a file is a report of this package."""
     with path.open("rb") as file:
-        return GENERATOR.encode() in file.read(HEAD)
+        return GENERATOR.encode() in file.read(1000)  # bytes that hold its head
 
 
 def is_figure(path: Path) -> bool:

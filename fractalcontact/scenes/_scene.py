@@ -11,7 +11,6 @@ from typing import Any
 from fractalcontact.base.tables import html_table
 
 Table = Mapping[str, Any]
-SHOWN = 6  # values of a list that are shown in full
 OF_SURFACE = "surface"  # plane of an upper face: plane and cells of the table [surface]
 LOADS = ("closure", "normal_force", "nominal_pressure")
 PRESS = "press"
@@ -205,7 +204,7 @@ def _short(value: Any) -> str:
         )
         return ", ".join(parts)
     if isinstance(value, (list, tuple)):
-        if len(value) > SHOWN:
+        if len(value) > 6:  # more than fit beside the other keys
             return f"[{_short(value[0])}, {_short(value[1])} ... {_short(value[-1])}] ({len(value)} values)"
         return f"[{', '.join(map(_short, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)

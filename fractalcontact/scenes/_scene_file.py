@@ -24,11 +24,8 @@ from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, Scene, Table
 from fractalcontact.scenes._scene_keys import Keys
 from fractalcontact.scenes._stages import STAGES, Stage, StageType
 
-LARGEST_FILE = 1 << 20  # bytes
-LONGEST_KEY = 32  # parts of a dotted key; the time and the memory of the parser grow with their square
 NOT_IN_KEYS = re.compile(r"[^\w\s.\"'-]")
 KEY_PART = re.compile(r"[\w\"']\s*\.")
-DEEPEST = 8  # levels of tables and lists; a scene has four
 TOO_DEEP = "tables or lists are nested too deeply: expected a table, its sub-tables and lists in them"
 # keys that people write as the symbol of the field
 SYMBOLS = {
@@ -90,10 +87,10 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
     return check_tables(Scene(source.stem, tables, source.resolve().parent))
 
 
-def _is_too_deep(value: Any) -> bool:
-    """Return whether tables and lists are nested deeper than any scene needs."""
+def _is_too_deep(value: Any, levels: int = 8) -> bool:
+    """Return whether tables and lists are nested deeper than any scene needs, which has four levels."""
     level = [value]
-    for _ in range(DEEPEST):
+    for _ in range(levels):
         inner = [item.values() if isinstance(item, dict) else item for item in level]
         level = [item for items in inner for item in items if isinstance(item, (dict, list))]
         if not level:
@@ -130,17 +127,20 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
     return scene, problems
 
 
-def _text(source: Path) -> str:
-    """Return the text of a scene; refuse one that takes the parser minutes or gigabytes."""
+def _text(source: Path, size: int = 1 << 20, parts: int = 32) -> str:
+    """Return the text of a scene; refuse one that takes the parser minutes or gigabytes.
+
+    It has at most `size` bytes. Time and memory of the parser grow with the square of the parts of a key.
+    """
     with source.open("rb") as file:
-        content = file.read(LARGEST_FILE + 1)
-    if len(content) > LARGEST_FILE:
-        raise ValueError(f"expected at most {LARGEST_FILE >> 10} KiB, got more")
+        content = file.read(size + 1)
+    if len(content) > size:
+        raise ValueError(f"expected at most {size >> 10} KiB, got more")
     text = content.decode("utf-8-sig").replace("\r\n", "\n")
     for number, line in enumerate(text.splitlines(), 1):
         words = NOT_IN_KEYS.split("" if line.lstrip().startswith("#") else line)
-        if max(len(KEY_PART.findall(word)) for word in words) > LONGEST_KEY:
-            raise ValueError(f"expected a key of at most {LONGEST_KEY} parts, got more in line {number}")
+        if max(len(KEY_PART.findall(word)) for word in words) > parts:
+            raise ValueError(f"expected a key of at most {parts} parts, got more in line {number}")
     return text
 
 

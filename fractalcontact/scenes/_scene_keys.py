@@ -118,8 +118,12 @@ def _choice(words: Iterable[str]) -> Kind:
 def _choices(words: Iterable[str]) -> Kind:
     """Return the kind of one word or a list of words."""
     allowed = list(words)
-    schema = {"anyOf": [{"enum": allowed}, {"type": "array", "items": {"enum": allowed}}]}
-    return _kind(Problems.choices, schema, allowed)
+    return _kind(Problems.choices, _one_or_several({"enum": allowed}), allowed)
+
+
+def _one_or_several(one: Schema, **more: int) -> Schema:
+    """Return the schema of a value or a list of such values."""
+    return {"anyOf": [one, {"type": "array", **more, "items": one}]}
 
 
 def _check_files(problems: Problems, place: str, value: Any) -> None:
@@ -159,10 +163,9 @@ def _unchecked(problems: Problems, place: str, value: Any) -> None:
 COMPASS = tuple(AZIMUTHS)
 _AZIMUTH = number(above=-LARGEST_AZIMUTH, below=LARGEST_AZIMUTH).schema
 _DIRECTION = {"anyOf": [{"enum": [*COMPASS, *AZIMUTH_WORDS]}, _AZIMUTH]}
-_FILE = {"type": "string", "minLength": 1}
 ANYTHING, VALUE = Kind(_unchecked), Kind(_check_value)
 FLAG = Kind(Problems.boolean, {"type": "boolean"})
-FILES = Kind(_check_files, {"anyOf": [_FILE, {"type": "array", "minItems": 1, "items": _FILE}]})
+FILES = Kind(_check_files, _one_or_several({"type": "string", "minLength": 1}, minItems=1))
 DIRECTION = Kind(_check_direction, _DIRECTION)
 TITLE = Kind(
     lambda problems, place, value: problems.require(isinstance(value, str), place, "words", value),
@@ -177,7 +180,7 @@ SHARED = {
     "block": _numbers(above=0.0).about("Edges of the upper block, m."),
     **dict.fromkeys(("spacing", "structure_size"), _numbers(above=0.0)),
     **{key: _numbers(unit=key in PRESSURES, at_least=0.0) for key in ("shear", *LOADS)},
-    "direction": Kind(_check_directions, {"anyOf": [_DIRECTION, {"type": "array", "items": _DIRECTION}]}),
+    "direction": Kind(_check_directions, _one_or_several(_DIRECTION)),
 }
 LEVEL = _integer(at_least=0).about("Remove the least-squares polynomial of this degree.")
 OF_FILES = {

@@ -23,12 +23,10 @@ from fractalcontact.scenes._stages import FIGURES, Stage, section_length
 if TYPE_CHECKING:
     import xarray as xr
 
-# bytes of the libraries and compiled kernels that a study loads, measured on scenes of 48 x 48 points
+# bytes of the libraries that a study has loaded at its start, and of the compiled kernels of a subpackage,
+# measured on scenes of 48 x 48 points
 STARTED = 1.2e8
-COMPILER = 6.0e7  # with the first of these subpackages; each adds its kernels
 KERNELS = {"dimensions": 5.0e7, "contact": 6.0e7, "joints": 6.0e7, "domains": 2.0e7}
-DRAWING = 9.0e7
-READ = 24.0  # bytes for each point of a file while it is read
 PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
 
 
@@ -86,15 +84,15 @@ def check_memory(
 def _libraries(loaded: set[str]) -> float:
     """Return the bytes of the libraries and kernels of these subpackages."""
     names = loaded & set(KERNELS) - ({"contact"} if "joints" in loaded else set())  # joints use the same
-    compiled = COMPILER + sum(KERNELS[name] for name in names) if names else 0.0
-    return STARTED + compiled + (DRAWING if "plotting" in loaded else 0.0)
+    compiled = 6.0e7 + sum(KERNELS[name] for name in names) if names else 0.0  # with the compiler
+    return STARTED + compiled + (9.0e7 if "plotting" in loaded else 0.0)
 
 
 def _surface_memory(scene: Scene, plane: Plane) -> float:
     """Return the bytes of making or reading the surface."""
     table = scene.surface
     if table.generate is None:
-        return READ * plane.cells
+        return 24.0 * plane.cells  # bytes while a file is read
     function = public_function(f"surfaces.{table.generate}")
     members = int(generator_options(table).get("members") or 1)
     return bytes_on(function.memory, replace(plane, planes=members), {})  # type: ignore[attr-defined]

@@ -18,10 +18,6 @@ from fractalcontact.scenes._overview import scan_facts, scan_tables
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
 from fractalcontact.scenes._stages import STAGES
 
-LINES = 36  # of a summary on the screen; a command adds what it has written, 40 in all
-CAVEATS = 3  # shown on the screen; the report has all
-MOST_COLUMNS = 8  # beside the key: more do not fit 110 characters without heads of three lines
-FEWEST_ROWS = 2  # of a table on the screen: the first and the last
 MORE = "--verbose and the report have all"
 
 
@@ -127,7 +123,8 @@ def _fit(one: ResultTable, other: ResultTable) -> bool:
     """Return whether the rows of one table are among those of another."""
     if not one.key_heads or one.key_heads != other.key_heads:
         return False
-    if len(one.heads) + len(other.heads) > MOST_COLUMNS:
+    # more columns beside the key do not fit 110 characters without heads of three lines
+    if len(one.heads) + len(other.heads) > 8:
         return False
     ours, theirs = set(one.keys), set(other.keys)
     return (
@@ -135,17 +132,20 @@ def _fit(one: ResultTable, other: ResultTable) -> bool:
     )
 
 
-def screen_text(tree: xr.DataTree, limits: list[str] | None = None) -> str:
-    """Return the summary in at most `LINES` lines: results first, then at most three of the caveats."""
+def screen_text(tree: xr.DataTree, limits: list[str] | None = None, lines: int = 36, most: int = 3) -> str:
+    """Return the summary in so many lines: results first, then at most `most` of the caveats.
+
+    A command adds what it has written, 40 lines in all.
+    """
     tables = joined_tables(list(_tables(tree, screen=True)))
     notes = caveats(tree) if limits is None else limits
-    ends = [str(Note(caveat, indent=0)) for caveat in notes[:CAVEATS]]
-    ends += [f"caveats left out: {len(notes) - CAVEATS}; {MORE}"] if len(notes) > CAVEATS else []
+    ends = [str(Note(caveat, indent=0)) for caveat in notes[:most]]
+    ends += [f"caveats left out: {len(notes) - most}; {MORE}"] if len(notes) > most else []
     title = str(tree.attrs.get("title", tree.name or "result"))
-    lines = [str(_as_line(each)) for each in tables if not each.key_heads]
-    head = "\n".join([title, *(str(Note(fact, indent=0)) for fact in facts(tree)), *lines])
+    single = [str(_as_line(each)) for each in tables if not each.key_heads]
+    head = "\n".join([title, *(str(Note(fact, indent=0)) for fact in facts(tree)), *single])
     foot = ["\n".join(ends)] if ends else []
-    left = LINES - sum(part.count("\n") + 2 for part in [head, *foot])
+    left = lines - sum(part.count("\n") + 2 for part in [head, *foot])
     return "\n\n".join([head, *_fitted([each for each in tables if each.key_heads], left), *foot])
 
 
@@ -159,7 +159,7 @@ def _fitted(tables: Sequence[ResultTable], lines: int) -> list[str]:
 
     while height() > lines and shown:
         longest = int(np.argmax(most))
-        if most[longest] > FEWEST_ROWS:
+        if most[longest] > 2:  # the first and the last
             most[longest] -= 1
             shown[longest] = table(tables[longest].shortened(most[longest]).rows, rule=False)
         else:

@@ -23,10 +23,6 @@ Files = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 WHERE = "fractalcontact.scenes.template"
 QUESTIONS = ("roughness", "contact", "joint")
-JRC_LAG = 0.508e-3  # m: the interval of the readings of Tse and Cruden
-JRC_LENGTHS = 10  # least number of intervals along a surface
-LIGHT, FULL = 1e-3, 0.2  # fractions of true contact of the default loads
-TRAVEL_POINTS = 60  # of a curve of the rigid dilatancy, which costs milliseconds
 
 
 def template(
@@ -237,22 +233,27 @@ def _file_table(scan: Files, folder: str | os.PathLike[str], options: Mapping[st
     return {"read": paths if isinstance(scan, (list, tuple)) else paths[0], **options}
 
 
-def _roughness(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """Return whether the points resolve JRC, and warn where those of a long face do not."""
-    is_long, spacing = facts["extent"] >= JRC_LENGTHS * JRC_LAG, facts["spacing"]
-    if is_long and spacing > JRC_LAG:
-        lag, distance = quantity_text(JRC_LAG, "m"), quantity_text(spacing, "m")
-        message = f"JRC is left out: its readings are {lag} apart, and the points of this face {distance}"
+def _roughness(facts: Mapping[str, Any], lag: float = 0.508e-3) -> dict[str, Any]:
+    """Return whether the points resolve JRC, and warn where those of a long face do not.
+
+    Tse and Cruden read profiles every .508 mm; a long face has ten such intervals.
+    """
+    is_long, spacing = facts["extent"] >= 10 * lag, facts["spacing"]
+    if is_long and spacing > lag:
+        readings, distance = quantity_text(lag, "m"), quantity_text(spacing, "m")
+        message = (
+            f"JRC is left out: its readings are {readings} apart, and the points of this face {distance}"
+        )
         warnings.warn(message, FractalContactWarning, stacklevel=3)
-    return {"has_jrc": is_long and spacing <= JRC_LAG}
+    return {"has_jrc": is_long and spacing <= lag}
 
 
 def _loads(facts: Mapping[str, Any], young: Any, poisson: float) -> dict[str, Any]:
-    """Return the ends of the path of the load on a flat."""
+    """Return the ends of the path of the load on a flat: true contact of a thousandth and of a fifth."""
     # a fraction of true contact needs about half of it times modulus and rms slope (Bush; Persson)
     modulus = 0.5 * float(young) / (1.0 - poisson**2)
     unit = 0.5 * modulus * max(facts["slope"], 1e-12)
-    return {"first": _rounded(LIGHT * unit), "last": _rounded(FULL * unit)}
+    return {"first": _rounded(1e-3 * unit), "last": _rounded(0.2 * unit)}
 
 
 def _travel(facts: Mapping[str, Any]) -> dict[str, Any]:
@@ -265,7 +266,7 @@ def _travel(facts: Mapping[str, Any]) -> dict[str, Any]:
         "block": _rounded(block),
         "shears": sorted(set(shears)),
         "farthest": _rounded(farthest),
-        "step": _rounded(max(step, farthest / TRAVEL_POINTS)),
+        "step": _rounded(max(step, farthest / 60)),  # 60 points cost milliseconds
     }
 
 

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from fractalcontact.joints import Crack
 
 INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make
-LARGE = 1 << 18  # points of a generated surface that is not made twice
-COORDINATES = 24.0  # bytes of a coordinate while it is made
 
 
 def validate(scene: Scene | str | os.PathLike[str]) -> Scene:
@@ -210,9 +208,10 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
         return None
     shape = table.options["shape"]
     shape = shape if isinstance(shape, list) else [shape] * 2
-    if math.prod(shape) < LARGE:
+    if math.prod(shape) < 1 << 18:  # points: made twice in little time
         return None
-    require_memory("surface", COORDINATES * sum(shape), f"the coordinates of {shape[0]} x {shape[1]} points")
+    needed = 24.0 * sum(shape)  # bytes of a coordinate while it is made
+    require_memory("surface", needed, f"the coordinates of {shape[0]} x {shape[1]} points")
     return _zeros(shape, np.broadcast_to(table.options["spacing"], 2).tolist())
 
 
