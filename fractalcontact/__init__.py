@@ -12,6 +12,7 @@ accuracy    error against run time of every method
 plotting    figures drawn from labelled results
 
 `save` and `open` write and read results as NetCDF files. A subpackage is imported when it is first used.
+Exceptions and warnings are in `fractalcontact.base.errors`; `InvalidInput` is a `ValueError` too.
 """
 
 import lazy_loader

@@ -139,6 +139,10 @@ REQUIREMENTS = {
     "joints/self_weight": _SOLVER,
     "joints/elastic_dilatancy": _SOLVER,
     "joints/partial_slip": _SOLVER,
+    "joints/direct_shear": Requirement((), _SOLVER.kernels),
+    # a fit of the facets
+    "joints/directional_roughness": Requirement(("scipy.optimize",)),
+    "joints/strength_envelope": Requirement(("scipy.optimize",)),
     "partial_slip": _SOLVER,
     "joints/transmissivity": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
     "joints/uplift": Requirement(("scipy.sparse.linalg", "scipy.sparse.csgraph")),
@@ -194,15 +198,22 @@ def required_stages(scene):
     return required
 
 
+# the stage of a word of `[want]`, where it has another name
+NAMED = {
+    "surfaces/height": "surfaces",
+    "surfaces/describe": "surfaces/description",
+    "contact/press": "contact",
+    "contact/partial_slip": "partial_slip",
+}
+
+
 def _is_wanted(stage, scene):
     """Whether the words of `[want]` name the stage, or its figures show it."""
-    subpackage, _, name = stage.partition("/")
+    words = {stage: word for word, stage in NAMED.items()}
+    subpackage, _, name = words.get(stage, stage).partition("/")
     if stage == FIGURES:
         return True
-    if stage == "surfaces":
-        return "height" in scene.wanted(subpackage)
-    words = {"description": "describe"}.get(name, name)
-    return words in scene.wanted(subpackage) if name else bool(scene.wanted(subpackage))
+    return name in scene.wanted(subpackage) if name else bool(scene.wanted(subpackage))
 
 
 def _words(scene):

@@ -14,10 +14,31 @@ import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError
 
 TEMPLATE = (
-    SOUND.partition("[want]")[0].replace("shear = [", "shear = [0.0, ")
+    SOUND.partition("[want]")[0]
+    .replace("shear = [", "shear = [0.0, ")
+    .replace("poisson = 0.2", "poisson = 0.2\nbasic_friction_angle = 30.0")
     + """
 [contact]
 nominal_pressure = [1e5, 1e6]
+[contact.partial_slip]
+normal_force = 1.0
+tangential_force = [0.1, 0.2]
+[joint.partial_slip]
+normal_force = 1.0
+tangential_force = [0.1, 0.2]
+[joint.closure_laws]
+seating_pressure = 1e3
+[joint.direct_shear]
+hardness = 1e8
+nominal_pressure = [1e6]
+path = 4e-4
+[joint.shear_curve]
+displacement = [0.0, 1e-4, 4e-4]
+nominal_pressure = [1e6]
+wall_strength = 1e8
+[joint.strength_envelope]
+nominal_pressure = [1e6, 2e6]
+wall_strength = 1e8
 [joint.elimination]
 block = 1.2e-3
 [joint.self_weight]
@@ -32,42 +53,19 @@ q = [0.0, 2.0]
 SUBPACKAGE = ["WORD"]
 """
 )
-WANTED = {
-    "surfaces": ("height", "describe", "texture"),
-    "dimensions": ("default", *fc.dimensions.methods()),
-    "contact": ("press",),
-    "joints": (
-        "delta_surface",
-        "closure",
-        "rigid_dilatancy",
-        "elastic_dilatancy",
-        "friction",
-        "decorrelation_length",
-        "transmissivity",
-        "uplift",
-        "delta_dimension",
-        "elimination",
-        "area_dimension",
-        "self_weight",
-    ),
-    "domains": tuple(name for name in fc.domains.__all__ if name not in ("area_dimension", "read_mask")),
-}
+WANT = fc.scenes.json_schema()["properties"]["want"]["properties"]  # made from the table of stages
 WORDS = {
     f"{subpackage}/{word}": TEMPLATE.replace("SUBPACKAGE", subpackage).replace("WORD", word)
-    for subpackage, words in WANTED.items()
-    for word in words
+    for subpackage in ("surfaces", "dimensions", "contact", "joints", "domains")
+    for word in WANT[subpackage]["anyOf"][0]["enum"]
 }
 # stages beside the one that a word names; all need the surface
 ALSO = {
     "joints/friction": {"joints/rigid_dilatancy"},
     "joints/transmissivity": {"joints/closure"},
     "joints/uplift": {"joints/closure"},
+    "joints/closure_laws": {"joints/closure"},
 } | {word: {"joints/closure"} for word in WORDS if word.startswith("domains/")}
-NAMED = {
-    "surfaces/height": "surfaces",
-    "surfaces/describe": "surfaces/description",
-    "contact/press": "contact",
-}
 
 
 def scene(folder, text):
@@ -78,10 +76,14 @@ def scene(folder, text):
 @pytest.mark.parametrize("word", list(WORDS))
 def test_wanted_result_plans_only_the_required_stages(tmp_path, word):
     study = scene(tmp_path, WORDS[word])
-    named = "dimensions" if word.startswith("dimensions/") else NAMED.get(word, word)
+    named = "dimensions" if word.startswith("dimensions/") else resources.NAMED.get(word, word)
     expected = {"surfaces", named} | ALSO.get(word, set())
     planned = {stage.name for stage in fc.scenes.plan(study)}
     assert planned == resources.required_stages(study) == expected
+
+
+def test_every_estimator_has_its_requirements():
+    assert {f"dimensions/{name}" for name in fc.dimensions.methods()} <= set(resources.REQUIREMENTS)
 
 
 CHAIN = """
