@@ -1,6 +1,7 @@
 """Cost of a solution: transforms, memory, windows; and bits independent of threads and units."""
 
 import itertools
+import json
 import tracemalloc
 
 import numpy as np
@@ -187,3 +188,13 @@ def test_pair_sums_only_for_light_contact(grids, influence):
     light = press(surface, nominal_pressure=MODULUS * 1e-7, influence=influence)
     assert grids[-1][0] == 1
     assert bool(light["converged"].all())
+
+
+def test_provenance_names_the_solver_of_each_step():
+    def solvers(surface, **options):
+        return json.loads(press(surface, **options).attrs["provenance"])["solver"]
+
+    free, loads = rough(48, periodic=False), MODULUS * np.array([0.0, 1e-6, 2e-6])
+    assert solvers(free, nominal_pressure=loads) == "closed_form (1 steps), node_pairs (2 steps)"
+    assert solvers(free, nominal_pressure=loads[1:], method="elimination") == "elimination (2 steps)"
+    assert solvers(rough(48), nominal_pressure=loads[1:]) == "whole_plane (2 steps)"
