@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.jit import kernel
+from fractalcontact.base.jit import inner_kernel, kernel
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains._masks import Array, Planes, check_mask
 
@@ -344,7 +344,7 @@ def _corners_less_sides(inside: Array, connectivity: int) -> int:
     return int(np.count_nonzero(a & b & c & d) - np.count_nonzero(b & d) - np.count_nonzero(c & d))
 
 
-@kernel
+@inner_kernel
 def _find_root(parent: Array, shift: Array, part: int) -> int:
     """Follow a part to the root of its island; its shift becomes that from the root."""
     root = part

@@ -14,7 +14,7 @@ import xarray as xr
 from scipy.special import stdtrit
 
 from fractalcontact.base import fft
-from fractalcontact.base.jit import kernel, sum_kernel
+from fractalcontact.base.jit import inner_kernel, kernel, sum_kernel
 from fractalcontact.base.memory import Plane
 from fractalcontact.base.results import ARRAYS, public_result
 from fractalcontact.base.validation import Problems
@@ -346,7 +346,7 @@ def half_width(replicates: Array) -> Array:
     return np.asarray(stdtrit(replicates.shape[1] - 2, 0.975) * jackknife_error(replicates))
 
 
-@kernel
+@inner_kernel
 def add_row(columns: Array, entering: Array, leaving: Array, leaves: bool) -> None:
     """Move the sums over a column of the box on by one row."""
     if leaves:
@@ -358,7 +358,7 @@ def add_row(columns: Array, entering: Array, leaving: Array, leaves: bool) -> No
             columns[j] += entering[j]
 
 
-@kernel
+@inner_kernel
 def add_up(columns: Array, prefix: Array, count: int) -> None:
     """Add up columns from the left, `count` of them; a periodic axis continues."""
     total = prefix[0]
@@ -407,26 +407,18 @@ def glide(
         for block in range(blocks):
             start, stop = -(-block * across // blocks), -(-(block + 1) * across // blocks)
             left, right = prefix[start:stop], prefix[start + width : stop + width]
+            seen_left, seen_right = seen_prefix[start:stop], seen_prefix[start + width : stop + width]
             places, hits = 0, 0
             mass, square = np.int64(0) * prefix[0], 0.0
-            if has_gaps:
-                seen_left, seen_right = seen_prefix[start:stop], seen_prefix[start + width : stop + width]
-                for j in range(left.size):
-                    inside = prefix.dtype.type(right[j] - left[j])
-                    if seen_right[j] - seen_left[j] < area:
-                        inside = prefix.dtype.type(0)
-                    else:
-                        places += 1
-                    hits += inside > 0
-                    mass += inside
-                    square += np.float64(inside) * np.float64(inside)
-            else:
-                places = left.size
-                for j in range(left.size):
-                    inside = prefix.dtype.type(right[j] - left[j])
-                    hits += inside > 0
-                    mass += inside
-                    square += np.float64(inside) * np.float64(inside)
+            for j in range(left.size):
+                inside = prefix.dtype.type(right[j] - left[j])
+                if has_gaps and seen_right[j] - seen_left[j] < area:
+                    inside = prefix.dtype.type(0)
+                else:
+                    places += 1
+                hits += inside > 0
+                mass += inside
+                square += np.float64(inside) * np.float64(inside)
             target = i * blocks // rows * blocks + block
             sums[0, target] += places
             sums[1, target] += hits
