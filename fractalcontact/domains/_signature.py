@@ -1,7 +1,7 @@
 """Signature of a contact domain: lengths, dimension over one window, clustering, patches, with intervals.
 
 Everything follows from the share P(s) of positions at which a gliding square of side s meets the set, and
-from the moments of its mass (`_gliding_box.py`). All lengths are common to the states of a path, so that
+from the moments of its mass (`_lacunarity.py`). All lengths are common to the states of a path, so that
 states, and one state on several grids, can be compared.
 """
 
