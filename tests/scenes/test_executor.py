@@ -268,9 +268,8 @@ def test_copy_of_the_process_computes_the_same_numbers(tmp_path, monkeypatch, te
 def test_last_task_keeps_all_threads(tmp_path, monkeypatch):
     """A copy of the process helps from two tasks on: one alone is not held to half of the threads."""
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "2")
-    done, copies, counts = run_with_a_slow_start(tmp_path, SOUND.replace(', "rigid_dilatancy"', ""))
-    assert (done.returncode, copies) == (0, 0)
-    assert set(counts) == {2}
+    done, _, counts = run_with_a_slow_start(tmp_path, SOUND.replace(', "rigid_dilatancy"', ""))
+    assert (done.returncode, counts) == (0, [2, 2])  # whatever copy prepares the page
 
 
 FAILING = SLOW_START.replace(
