@@ -79,7 +79,7 @@ def pressures(
     balance = Balance(i, j, conductance, network.jump[chosen], to_held, level)
     scale, possible = float(np.linalg.norm(balance.surplus(np.zeros(size)))) or 1.0, balance.possible
     p, most = even.ravel()[inside], dissipation(network, even, inside, held)
-    if np.linalg.norm(balance.surplus(p)) > 1e-14 * scale:
+    if np.linalg.norm(balance.surplus(p)) > 1e-14 * scale:  # less where all cells are open alike
         unknown = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
         sequence = number[order[inside[order]]]
         sequence = (np.cumsum(unknown) - 1)[sequence[unknown[sequence]]]

@@ -97,6 +97,7 @@ def _check_drains(problems: Problems, drains: Any, gap: xr.DataArray) -> None:
     grid = read_grid(gap)
     for column, axis in ((0, 1), (1, 0)):
         place = _from_edge(gap, axis, points.reshape(-1, 2)[:, column]) / grid.spacing[axis]
+        # a point on the edge may be off by its digits
         inside = (place >= -1e-4) & (place <= gap.shape[axis - 2] + 1e-4)
         if not problems.require(bool(inside.all()), "drains", expected, drains):
             return

@@ -248,6 +248,7 @@ def _regular_axes(points: Array, spacing: float | None) -> tuple[_Axis, ...] | N
         return None
     if math.prod(axis.count for axis in axes) > 2 * len(points):  # too few to leave gaps between them
         return None
+    # a spacing may be stated with three digits
     matches = spacing is None or all(abs(axis.spacing - spacing) <= 1e-3 * spacing for axis in axes)
     return axes if matches else None
 
