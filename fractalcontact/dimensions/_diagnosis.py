@@ -16,19 +16,14 @@ from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_REPEATED = 0.1  # share of rows or columns
 _LINEAR = 0.01  # share of heights exactly on a line with their neighbours; measured heights have none
 _SPIKE = 20.0  # standard deviations: 1e8 Gaussian second differences reach 5.7, a scanned rock face 15
 _SPIKED = 0.1  # share of the squared second differences below which noise and misfit describe them
-_KNOWN = 1 << 20  # squared differences whose quantile is taken: it scatters by .2 %
-_SEAM = 6.0  # deviations of a line of increments; 5.3 was the most of 750 exact surfaces, H .1 to .9
-_ON_LINE = 512  # points of a line that are looked at: their median scatters by 7 %, a seam doubles it
+# of the logarithm of a line of increments, over the range of the middle half of all: 6 standard deviations;
+# 5.3 was the most of 750 exact surfaces, H .1 to .9
+_SEAM = 4.45
 _BESIDE = 4.5  # z of the heights beside gaps: 1 of 1e5 surfaces
-_AROUND = 15  # edge of the surroundings of a height beside a gap
 _FEWEST_GAPS = 12  # the scatter of their means is then known to a fifth
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)  # its multiples modulo one are even
-_NORMAL_QUARTILE = 0.6744897501960817
-_ROWS, _SAMPLE = 16, 4096  # rows and heights that are looked at for rounding
 _WHOLE = 0.02  # of a step: distance of rounded heights from whole steps, after a change of unit
 _DISTINCT = 0.5  # share of distinct heights beyond which they are not rounded
 _BLOCKS = 8  # along each axis, in which roughness is compared, and parts of each block along each axis
@@ -45,7 +40,7 @@ def diagnose(surface: Surface) -> str:
             "grid the points with "
             "fractalcontact.surfaces.from_points, or give `scales` from eight distances of the points on"
         )
-    if surface.repeated_share > _REPEATED:
+    if surface.is_enlarged:
         return (
             "many rows or columns repeat their neighbours: the surface was enlarged; remove the "
             "repeated ones, or give "
@@ -58,15 +53,15 @@ def diagnose(surface: Surface) -> str:
     )
 
 
-def rounding_step(surface: Surface) -> float:
-    """Return the step to which scaled heights were rounded; 0 where none is seen in some of the rows.
+def rounding_step(surface: Surface, *, rows: int = 16, sample: int = 4096) -> float:
+    """Return the step to which scaled heights were rounded; 0 where none is seen in a sample of some rows.
 
     Second differences are multiples of it, also once a plane was subtracted.
     """
-    rows = surface.heights[:: max(1, surface.shape[0] // _ROWS)]
-    bends = np.diff(rows[:, :: -(-rows.size // _SAMPLE)], 2, axis=1)
+    lines = surface.heights[:: max(1, surface.shape[0] // rows)]
+    bends = np.diff(lines[:, :: -(-lines.size // sample)], 2, axis=1)
     observed = bends[np.isfinite(bends)]
-    rounding = 64.0 * np.spacing(float(np.nanmax(np.abs(rows), initial=0.0)))  # of the numbers themselves
+    rounding = 64.0 * np.spacing(float(np.nanmax(np.abs(lines), initial=0.0)))  # of the numbers themselves
     levels = np.unique(observed)
     levels = levels[np.diff(levels, prepend=-np.inf) > rounding]
     if observed.size < 8 or not 2 <= levels.size <= _DISTINCT * observed.size:
@@ -117,8 +112,12 @@ def _squared_bends(heights: Array, rows: int = 32) -> Iterator[Array]:
         yield np.square(bends, out=bends)
 
 
-def _spikes(heights: Array) -> str:
-    step = -(-heights.size // _KNOWN)
+def _spikes(heights: Array, known: int = 1 << 20) -> str:
+    """Look for squared differences beyond those of a Gaussian surface.
+
+    The quantile of some `known` ones scatters by .2 %.
+    """
+    step = -(-heights.size // known)
     sample = np.concatenate([squares.ravel()[::step] for squares in _squared_bends(heights)])
     sample = sample[np.isfinite(sample)]
     if sample.size == 0:
@@ -138,23 +137,24 @@ def _spikes(heights: Array) -> str:
     )
 
 
-def _seams(heights: Array, step: float) -> str:
+def _seams(heights: Array, step: float, points: int = 512) -> str:
     """Look for lines along an axis across which heights differ more than across all others.
 
-    Heights were rounded to `step`, which is spread evenly again.
+    Heights were rounded to `step`, which is spread evenly again. The median of some `points` of a line
+    scatters by 7 %; a seam doubles it.
     """
     if min(heights.shape) < 16 or np.isnan(heights.min()):
         return ""
     for whole, name in ((heights, "rows"), (heights.T, "columns")):
-        lines = np.ascontiguousarray(whole[:, :: max(1, whole.shape[1] // _ON_LINE)])
+        lines = np.ascontiguousarray(whole[:, :: max(1, whole.shape[1] // points)])
         # spikes move no median; where heights were rounded, it would jump between a few numbers
-        even = (np.arange(lines.shape[1]) * _GOLDEN) % 1.0 - 0.5
+        even = np.arange(lines.shape[1]) * 0.5 * (5.0**0.5 - 1.0) % 1.0 - 0.5  # multiples of the golden ratio
         steps = np.diff(lines, axis=0)
         squares = np.median((steps - np.median(steps) + step * even) ** 2, axis=1)
         if not squares.min() > 0.0:
             continue
         low, middle, high = np.quantile(np.log(squares), (0.25, 0.5, 0.75))
-        number = int(np.sum(np.log(squares) - middle > _SEAM * (high - low) / (2.0 * _NORMAL_QUARTILE)))
+        number = int(np.sum(np.log(squares) - middle > _SEAM * (high - low)))
         if number > 0:
             return (
                 f"heights jump between {name} at {number} places, as at seams of tiles: analyse the "
@@ -164,8 +164,11 @@ def _seams(heights: Array, step: float) -> str:
     return ""
 
 
-def _missing_extremes(heights: Array) -> str:
-    """Look for gaps whose neighbours lie to one side of their surroundings: valleys or peaks are missing."""
+def _missing_extremes(heights: Array, edge: int = 15) -> str:
+    """Look for gaps whose neighbours lie to one side of their surroundings: valleys or peaks are missing.
+
+    `edge`: points along an edge of the surroundings.
+    """
     from scipy.ndimage import grey_dilation, label, mean, uniform_filter
 
     observed = np.isfinite(heights)
@@ -179,8 +182,8 @@ def _missing_extremes(heights: Array) -> str:
     numbers = np.unique(owner)[1:]
     if numbers.size < _FEWEST_GAPS:
         return ""
-    around = uniform_filter(np.where(observed, heights, 0.0), _AROUND)
-    around /= np.maximum(uniform_filter(observed.astype(float), _AROUND), 1e-6)
+    around = uniform_filter(np.where(observed, heights, 0.0), edge)
+    around /= np.maximum(uniform_filter(observed.astype(float), edge), 1e-6)
     deviation = np.where(observed, heights - around, 0.0)
     means = np.asarray(mean(deviation, owner, numbers))
     z = float(means.mean() / (means.std(ddof=1) / np.sqrt(numbers.size)))

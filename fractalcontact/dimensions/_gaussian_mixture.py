@@ -145,8 +145,8 @@ class Bins:
     level, variance : ndarray, shape (bins,)
         Logarithm of the mean of power / pilot, without the bias of the logarithm, and its variance.
     tables : ndarray, shape (forms, spreads, bins, t)
-    spreads : ndarray
-        In x spacings, with `nodes`: FIRST_SPREAD and the step of asinh(s / FIRST_SPREAD).
+    nodes : ndarray
+        Of the table: FIRST_SPREAD and the step of asinh(s / FIRST_SPREAD), in x spacings.
     t : ndarray
     white : ndarray, shape (bins,)
         Mean of 1 / pilot.
@@ -160,7 +160,6 @@ class Bins:
     level: Array
     variance: Array
     tables: Array
-    spreads: Array
     nodes: Array
     t: Array
     white: Array

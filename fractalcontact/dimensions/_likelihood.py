@@ -62,7 +62,6 @@ _NO_MODES = (
 )
 _WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
 _SEEN = 0.8  # probability from which on a nuisance is named
-_DOUBLE = 2.0**-52  # relative step of the numbers themselves
 _NOISE_ROUNDS = 2  # of the amplitude, by which known noise is divided: it changes by less than 1 % in a third
 _EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
 _ROUNDS = 1  # corrections for a stretch and gaps; a second one moved no rms error by more than .0005
@@ -137,7 +136,7 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
         )
         return undefined(f"{number} modes {what}, at least {LEAST * _LEAST_BINS} are needed")
     unit = fit.scale * surface.unit
-    background = math.hypot(rounding_step(surface) / math.sqrt(12.0), _DOUBLE) / fit.scale
+    background = math.hypot(rounding_step(surface) / math.sqrt(12.0), float(np.finfo(float).eps)) / fit.scale
     bins = fit.bins(keep)
     options: dict[str, Any] = {"spread": spread, "background": background, "is_window": window is not None}
     options["pilot_spread"] = float(fit.theta[SPREAD]) if spread is None else 0.0

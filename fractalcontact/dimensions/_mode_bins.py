@@ -28,9 +28,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
-_SWEEPS = 12  # over missing points, after the pyramid: the fill of single points is then harmonic to 1 %
-_SIMULATED = 1 << 18  # modes that are simulated: the correction scatters by a fifth of the error of H
-_MOST = 8  # surfaces
+_SIMULATED = 1 << 18  # modes, of eight surfaces at most: the correction scatters by a fifth of the error of H
 _SAMPLE = 64  # modes of a bin over which an expectation is averaged: error below that of the pilot, .1 %
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _LEAK = 0.5  # share of the edges in the expected power from which on neighbouring modes are correlated
@@ -242,7 +240,6 @@ def make_bins(
         level=level,
         variance=np.asarray(polygamma(1, degrees)),
         tables=tables,
-        spreads=spreads,
         nodes=nodes,
         t=lattice.t,
         white=np.bincount(bins, weight),
@@ -252,10 +249,11 @@ def make_bins(
     )
 
 
-def fill(heights: Array) -> Array:
+def fill(heights: Array, sweeps: int = 12) -> Array:
     """Return heights whose missing points have the mean of their surroundings, of the pyramid of 2 x 2 means.
 
-    Some sweeps then move each missing point to the mean of its four neighbours.
+    Some sweeps then move each missing point to the mean of its four neighbours; after twelve the fill of
+    single points is harmonic to 1 %.
     """
     observed = np.isfinite(heights)
     if observed.all():
@@ -269,7 +267,7 @@ def fill(heights: Array) -> Array:
     above, below = np.maximum(rows - 1, 0) * nx + columns, np.minimum(rows + 1, ny - 1) * nx + columns
     left, right = rows * nx + np.maximum(columns - 1, 0), rows * nx + np.minimum(columns + 1, nx - 1)
     missing = rows * nx + columns
-    for _ in range(_SWEEPS):
+    for _ in range(sweeps):
         flat[missing] = 0.25 * (flat[above] + flat[below] + flat[left] + flat[right])
     return filled
 
@@ -295,7 +293,7 @@ def _halved(values: Array) -> Array:
 def filling_ratio(lattice: Lattice, pilot: Array, observed: Array) -> Array:
     """Return the power of modes after filling over that before, for Gaussian modes of the pilot."""
     stream = np.random.default_rng(1)
-    number = max(1, min(_MOST, math.ceil(_SIMULATED / pilot.size)))
+    number = max(1, min(8, math.ceil(_SIMULATED / pilot.size)))
     before, after = np.zeros_like(pilot), np.zeros_like(pilot)
     inner = (slice(None), slice(1, None)) if lattice.axes == 1 else (slice(1, None), slice(1, None))
     axes = (1,) if lattice.axes == 1 else (0, 1)

@@ -198,18 +198,18 @@ class Surface:
         return share
 
     @property
-    def repeated_share(self) -> float:
-        """Share of rows or columns in the middle that repeat the one before, as in an enlarged surface.
+    def is_enlarged(self) -> bool:
+        """Whether a tenth of the rows or columns in the middle repeat the one before.
 
         They do so at equal distances there; where heights were rounded, or rows were padded, they do not.
         """
-        share, middle = 0.0, self._middle
-        for lines in (middle, middle.T):
+        for lines in (self._middle, self._middle.T):
             starts = np.flatnonzero((lines[1:] != lines[:-1]).any(axis=1))
-            if len(starts) > 2 and len(starts) < len(lines) - 1:
+            if 2 < len(starts) < 0.9 * (len(lines) - 1):
                 apart = np.abs(starts - np.linspace(starts[0], starts[-1], len(starts))).max()
-                share = max(share, (1.0 - len(starts) / (len(lines) - 1)) * float(apart <= 1.0))
-        return share
+                if apart <= 1.0:
+                    return True
+        return False
 
     @property
     def _middle(self) -> Array:

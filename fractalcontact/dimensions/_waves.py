@@ -30,35 +30,18 @@ Array = np.ndarray[Any, np.dtype[Any]]
 SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
-MOST = 32  # sets of marks; more are a pattern
-MOST_REPEATED = 0.1  # share of rows or columns: a surface enlarged by repetition
+MOST = 32  # sets of marks, and searches; more are a pattern
 NONE_LEFT = 1e-8  # of the mean square increment: the waves are the surface
 FEW, FEW_LEFT = 3, 0.05  # more sets of waves than this that leave less than this are the surface, too
-NAMED = 3  # sets in a note
-_LEAST_SHARE = 1e-5  # of the mean square increment: less changes no estimate
 _LONGEST = {1: 7.0, 2: 4.0}  # least wavenumber tested, in steps, by number of axes: longer waves are the form
-_ROUNDS = (
-    12  # of searches: of 60 surfaces with marks 58 took up to 7, two find rests of one wave again and again
-)
-_FIRST_RING = 3  # steps: longer waves are those of the trend
+_FIRST_RING = 2  # steps: longer waves are those of the trend
 _IN_RING = 24  # modes, at least, of which a level is the median: it scatters by 40 %
-_WIDE, _NARROW = {1: 25, 2: 13}, 5  # edges of the box of modes about one, by number of axes, and of its gap
-_FALL = math.log(2.0)  # of the level from ring to ring, at most: a band may end inside a ring
-_CORRELATED = 1.5  # modes along an axis for one that is independent, under a sine taper
 _MARGIN = 12  # modes on either side of one that are compared with it
-_STEPS = np.r_[-_MARGIN:-2, 3 : _MARGIN + 1]  # on lines through it, beyond those that a taper correlates
-_DIRECTIONS = 24  # of lines: at 12 modes from one they are 1.6 modes apart
+_TAPER_REACH = 2  # modes on either side that a taper correlates with one
 _OF_LINE = 8.0  # independent modes of a line: with 12, waves in 9 of 80 surfaces with ridges, not in 4
 _OUTLYING = 8.0  # times the median of a line: stronger modes on it count as this, they may be multiples
-_ON_LINES = 8  # least number of modes among which the test against lines is one
-_SHADOW = 1e-2  # of the strongest power: weaker modes wait for the next search, as they may be its lobes
-_APART = 2.5  # modes between two waves under a taper
 _WIDTHS = 0.5, 0.2, 0.08, 0.03  # modes between frequencies whose parabola has the largest power
-_ALMOST_TWO_SPACINGS = 1e-3  # of the power: no sine is left there
-_LARGEST_RATIO = 1e8  # of a mode to its ring: with larger ones the running sums of the boxes lose digits
-_ROUNDING = 1e-22  # of the strongest mode
-_LEAST_POWER = 1e-280  # of the strongest mode: that of a constant is zero
-_MULTIPLES = 24  # of a wave that are named with it
+_ROUNDING = 1e-14  # of the strongest mode: the running sums of the boxes keep two digits beside it
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
 
@@ -97,9 +80,9 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     Notes
     -----
     Found where the probability is below 0.001; wavelengths from two spacings to a quarter of the extent (a
-    seventh of a profile). Among N points a wave is found from an amplitude of about 13 sqrt(S / N) on, S
+    seventh of a profile). Among N points a wave is found from an amplitude of about 11 sqrt(S / N) on, S
     being the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is
-    0.2 rms increments at 6 spacings, 0.5 at 12 and 2 at 24 (H = 0.5); at 256 x 256 half of it or less.
+    0.15 rms increments at 6 spacings, 0.45 at 12 and 2 at 24 (H = 0.5); at 256 x 256 half of it or less.
     Multiples of a wave that are shorter than two spacings are listed at their aliases. `estimate` removes
     what is found. Detection and its limits: pages `theory_dimensions` and `estimator_accuracy`.
 
@@ -116,7 +99,7 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     >>> print(f"{float(result.wavelength[0]):.1e} m at {float(result.wave_azimuth[0]):.0f} degrees")
     5.0e-05 m at 53 degrees
     """
-    found = [find_waves(single) for single in read_surfaces(surface)]
+    found = [find_waves(single)[0] for single in read_surfaces(surface)]
     return _dataset(surface, found)
 
 
@@ -164,20 +147,18 @@ def without_waves(surface: Surface) -> tuple[Surface, str]:
     """
     if min(surface.grid.shape) < SMALLEST or surface.is_constant or not surface.is_complete:
         return surface, ""
-    found = find_waves(surface)
+    found, rest = find_waves(surface)
     if not found:
         return surface, ""
-    heights = surface.heights.copy()
-    for wave in found:
-        heights -= wave.heights(heights.shape)
-    left = _mean_square_increment(heights) / _mean_square_increment(surface.heights)
-    sets = _sets(found, heights.shape)
+    before = without_trend(surface.heights, plane=not all(surface.grid.periodic))
+    left = _mean_square_increment(rest) / _mean_square_increment(before)
+    sets = _sets(found, surface.shape)
     if left < (FEW_LEFT if len(sets) > FEW else NONE_LEFT) or _is_progression(found):
         return surface, ""
-    named = ", ".join(map(_name, sets[:NAMED]))
-    more = f" and {len(sets) - NAMED} weaker ones" if len(sets) > NAMED else ""
+    named = ", ".join(map(_name, sets[:FEW]))
+    more = f" and {len(sets) - FEW} weaker ones" if len(sets) > FEW else ""
     count = f"{len(sets)} single waves" if len(sets) > 1 else "a single wave"
-    return surface.with_heights(heights), f"{count} removed: {named}{more}"
+    return surface.with_heights(rest), f"{count} removed: {named}{more}"
 
 
 def _name(members: Sequence[Wave]) -> str:
@@ -195,37 +176,39 @@ def _is_progression(found: Sequence[Wave]) -> bool:
     return len(found) > FEW and bool(np.ptp(ratios) < 0.02 * ratios.mean())
 
 
-def _sets(found: Sequence[Wave], shape: tuple[int, ...]) -> list[list[Wave]]:
-    """Sort waves by the one whose multiples they are, which comes first; the strongest set first."""
+def _sets(found: Sequence[Wave], shape: tuple[int, ...], highest: int = 24) -> list[list[Wave]]:
+    """Sort waves by the one whose multiples they are, which comes first; the strongest set first.
+
+    Multiples up to the `highest` are named with their wave.
+    """
     left, sets = sorted(found, key=lambda wave: -wave.wavelength), []
     while left:
-        places = [k * left[0].cycles for k in range(1, _MULTIPLES + 1)]
+        places = [k * left[0].cycles for k in range(1, highest + 1)]
         members = [wave for wave in left if any(_is_beside(wave.cycles, at, shape, 1.0) for at in places)]
         left = [wave for wave in left if wave not in members]
         sets.append(members)
     return sorted(sets, key=lambda members: -max(wave.amplitude for wave in members))
 
 
-def find_waves(surface: Surface) -> list[Wave]:
-    """Return the single waves of a complete surface or profile, the strongest first.
+def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
+    """Return the single waves of a complete surface or profile, the strongest first, and its other heights.
 
     None if there are more than a few dozen. Blocks of equal heights are periodic, but no waves.
     """
-    if surface.repeated_share > MOST_REPEATED:
-        return []
     shape = surface.shape
     crop = tuple(slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for n in shape)
     is_part = max(shape) > LARGEST_CROP
     is_periodic = all(surface.grid.periodic) and not is_part
     part = without_trend(surface.heights[crop], plane=not is_periodic)
     search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
-    peaks = search.peaks(part)
+    peaks = [] if surface.is_enlarged else search.peaks(part)
     if not peaks:
-        return []
+        return [], surface.heights
     rest = without_trend(surface.heights, plane=not is_periodic)
     part = rest[crop]  # a view: it changes with the rest
     found: list[Wave] = []
-    for _ in range(_ROUNDS):
+    for _ in range(MOST):
+        is_new = False
         for at, p_value in peaks:
             # what a wave has left of itself: it is fitted again
             again = [wave for wave in found if _is_beside(at, wave.cycles, part.shape)]
@@ -235,15 +218,17 @@ def find_waves(surface: Surface) -> list[Wave]:
             start = again[0].cycles if again else at
             if is_part and not again:
                 start = _fitted(part, start, is_periodic)[0]
-            wave = Wave.of(surface, *_fitted(rest, start, is_periodic), p_value)
+            least = min([p_value, *(wave.p_value for wave in again)])
+            wave = Wave.of(surface, *_fitted(rest, start, is_periodic), least)
             rest -= wave.heights(shape)
             found.append(wave)
-        if len(found) > MOST and len(_sets(found, shape)) > MOST:
-            return []
-        peaks = search.peaks(part)
+            is_new |= not again
+        peaks = search.peaks(part) if is_new else []
         if not peaks:
             break
-    return sorted(found, key=lambda wave: -wave.amplitude)
+    if len(_sets(found, shape)) > MOST:
+        return [], surface.heights
+    return sorted(found, key=lambda wave: -wave.amplitude), rest
 
 
 def _fitted(heights: Array, start: Array, is_periodic: bool) -> tuple[Array, complex]:
@@ -274,10 +259,11 @@ def _fitted(heights: Array, start: Array, is_periodic: bool) -> tuple[Array, com
         complex(taper @ np.exp(-4j * np.pi * f * np.arange(taper.size)))
         for f, taper in zip(cycles, tapers, strict=True)
     )
-    if total - abs(double) < _ALMOST_TWO_SPACINGS * total:
-        return cycles, mode / total
-    # the mode is that of the wave and of its mirror image: 2 M = p S(0) + p* S(2 f)
-    return cycles, 2.0 * (mode * total - mode.conjugate() * double) / (total**2 - abs(double) ** 2)
+    # the mode is that of the wave and of its mirror image: 2 M = p S(0) + p* S(2 f); at two spacings there is
+    # no sine
+    both = np.array([[total, double], [double.conjugate(), total]])
+    phasors = np.linalg.lstsq(both, np.array([2.0 * mode, 2.0 * mode.conjugate()]), rcond=1e-3)[0]
+    return cycles, complex(phasors[0])
 
 
 @dataclass(frozen=True)
@@ -296,8 +282,6 @@ class Search:
         Infinite where none is tested.
     box, gap : tuple of int
         Shape of the box of modes about one, and of its gap.
-    freedom : float
-        Independent modes in the box.
     """
 
     tapers: tuple[Array, Array]
@@ -308,7 +292,6 @@ class Search:
     number: Array
     box: tuple[int, int]
     gap: tuple[int, int]
-    freedom: float
 
     def peaks(self, heights: Array) -> list[tuple[Array, float]]:
         """Return cycles per point and probability of modes that stand out, the strongest first."""
@@ -317,19 +300,18 @@ class Search:
         ny, nx = heights.shape
         modes = fft.rfft2(heights * self.tapers[0][:, None] * self.tapers[1])
         power = modes.real**2 + modes.imag**2
-        if float(power.max()) < _LEAST_POWER:
+        if not power.any():
             return []
         y, x = np.fft.fftfreq(ny), np.arange(nx // 2 + 1) / nx
-        increment = power * (2.0 - np.cos(2.0 * np.pi * y)[:, None] - np.cos(2.0 * np.pi * x))
         ratio = self._ratio(power)
         tail = self._tail(ratio)
-        is_high = (np.log(self.number / FALSE_ALARM) < tail) & (increment > _LEAST_SHARE * increment.sum())
+        is_high = np.log(self.number / FALSE_ALARM) < tail
         rows, columns = np.nonzero(is_high)
         above = ratio[rows, columns + _MARGIN] / _line_level(ratio, rows, columns + _MARGIN)
-        limit = math.log(max(_ON_LINES, rows.size) / FALSE_ALARM)
+        limit = math.log(max(1, rows.size) / FALSE_ALARM)
         is_high[rows, columns] = _OF_LINE * np.log1p(above / _OF_LINE) > limit
         is_high &= power >= maximum_filter(power, self.gap, mode=("wrap", "nearest"))
-        rows, columns = np.nonzero(is_high & (power > _SHADOW * power[is_high].max(initial=0.0)))
+        rows, columns = np.nonzero(is_high)
         found: list[tuple[Array, float]] = []
         for place in np.argsort(-power[rows, columns]):
             row, column = rows[place], columns[place]
@@ -345,8 +327,9 @@ class Search:
 
         levels = np.array([np.median(ring) for ring in np.split(power.ravel()[self.order], self.ends)])
         logs = np.log(np.maximum(levels / math.log(2.0), _ROUNDING * float(power.max())))
-        logs = np.maximum(logs, maximum_filter1d(logs, 3) - _FALL)
-        ratio = np.minimum(power / np.exp(np.interp(self.log_q, self.log_ring, logs)), _LARGEST_RATIO)
+        # the level falls by half from ring to ring, at most: a band may end inside a ring
+        logs = np.maximum(logs, maximum_filter1d(logs, 3) - math.log(2.0))
+        ratio = power / np.exp(np.interp(self.log_q, self.log_ring, logs))
         ratio[self.log_q < math.log(_FIRST_RING - 0.5)] = 1.0
         nx = self.tapers[1].size
         columns = np.arange(-_MARGIN, ratio.shape[1] + _MARGIN) % nx
@@ -363,9 +346,13 @@ class Search:
             uniform_filter(ratio, size, mode=("wrap", "nearest")) * math.prod(size)
             for size in (self.box, self.gap)
         )
-        around = (box - gap) / (math.prod(self.box) - math.prod(self.gap))
-        level = np.maximum(around, 1.0)  # that of the ring: beyond the end of a band are no modes
-        tail = self.freedom * np.log1p(ratio / (level * self.freedom))
+        around = math.prod(self.box) - math.prod(self.gap)
+        # modes under a taper are correlated: so many of them are independent
+        freedom = around * math.prod(float(np.mean(t**2) ** 2 / np.mean(t**4)) for t in self.tapers)
+        level = np.maximum(
+            (box - gap) / around, 1.0
+        )  # that of the ring: beyond the end of a band are no modes
+        tail = freedom * np.log1p(ratio / (level * freedom))
         return np.asarray(tail[:, _MARGIN:-_MARGIN])
 
 
@@ -389,12 +376,9 @@ def _search(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: b
     share = np.where(is_tested, np.maximum(q, 1.0) ** -float(axes), 0.0)
     share[:, 0] *= 0.5  # each of these modes is there twice
     number = np.where(is_tested, share.sum() * q**axes, np.inf)
-    box = (1, _WIDE[1]) if axes == 1 else (_WIDE[2], _WIDE[2])
-    gap = (1, _NARROW) if axes == 1 else (_NARROW, _NARROW)
-    around = math.prod(box) - math.prod(gap)
-    freedom = around / (1.0 if is_periodic else _CORRELATED**axes)
+    box, gap = ((1 if axes == 1 else edge, edge) for edge in (2 * _MARGIN + 1, 2 * _TAPER_REACH + 1))
     tapers = _taper(ny, is_periodic), _taper(nx, is_periodic)
-    return Search(tapers, order, ends, log_ring, log_q, number, box, gap, freedom)
+    return Search(tapers, order, ends, log_ring, log_q, number, box, gap)
 
 
 def _taper(n: int, is_periodic: bool) -> Array:
@@ -408,19 +392,24 @@ def _line_level(ratio: Array, rows: Array, columns: Array) -> Array:
     The ray of ridges that are drawn with steps is folded at two spacings, and keeps its direction.
     """
     ny = ratio.shape[0]
-    angles: list[Any] = [np.pi * k / _DIRECTIONS for k in range(_DIRECTIONS if ny > 1 else 1)]
+    number = 2 * _MARGIN if ny > 1 else 1  # at the ends of the lines they are 1.6 modes apart
+    angles: list[Any] = [np.pi * k / number for k in range(number)]
     if ny > 1:
         angles.append(np.arctan2((rows + ny // 2) % ny - ny // 2, columns - _MARGIN)[:, None])
     level = np.ones(rows.size)
+    steps = np.arange(_TAPER_REACH + 1, _MARGIN + 1)
+    steps = np.r_[-steps[::-1], steps]
     for angle in angles:
-        along_y, along_x = (np.rint(_STEPS * f(angle)).astype(np.int64) for f in (np.sin, np.cos))
+        along_y, along_x = (np.rint(steps * f(angle)).astype(np.int64) for f in (np.sin, np.cos))
         modes = ratio[(rows[:, None] + along_y) % ny, columns[:, None] + along_x]
         most = _OUTLYING * np.median(modes, axis=1, keepdims=True)
         np.maximum(level, np.minimum(modes, most).mean(axis=1), out=level)
     return level
 
 
-def _is_beside(cycles: Array, other: Array, shape: tuple[int, ...], apart: float = _APART) -> bool:
+def _is_beside(
+    cycles: Array, other: Array, shape: tuple[int, ...], apart: float = _TAPER_REACH + 0.5
+) -> bool:
     """Return whether two waves, as they are or one of them reversed, are nearer than some modes."""
     return any(
         float(np.max(np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape)) < apart

@@ -225,7 +225,7 @@ def limiting_amplitude(shape, hurst, wavelength):
 def test_limit_of_detection_is_twice_that_of_the_best_test(shape, hurst, wavelength):
     limit = limiting_amplitude(shape, hurst, wavelength)
     shares = []
-    for factor in (0.9, 3.0):  # half of them at 1.7: the taper hides power, and lines and boxes are compared
+    for factor in (0.9, 3.0):  # half of them at 1.5: the taper hides power, and lines and boxes are compared
         found = []
         for seed in range(16):
             surface = brownian(shape, hurst, 200 + seed)
