@@ -54,9 +54,10 @@ _BLURRED = 0.15  # probability of a blur: with .5, 3 of 40 exact surfaces of 64 
 _LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any other self-affine surface
 _PRIOR_SHARPNESS = 0.0, 0.7  # normal in ln k, about the sum of two surfaces: 95 % are .25 to 4
 _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
-# probability of a corner: of 120 sums that are equal at a lag of 3 spacings 106 and 107 intervals hold H with
-# .15 and .2, at 8 spacings 110 and 111; with .2 exact ones (H = .2, .5, .9) are 19, 16 and 11 % wider
-_BENT = 0.15
+# probability of a corner. Of 160 sums each that are equal at a lag of 3 and of 8 spacings 124 and 138
+# intervals hold H with .1, 130 and 141 with .12, 137 and 148 with .15; 40 exact intervals each at H .2, .5
+# and .9 are .028, .041 and .061 wide with .1, .029 .042 .063 with .12, .032 .044 .065 with .15
+_BENT = 0.12
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
 _FOURTH = 0.1  # of (s q)^4: the fourth cumulant of a mean over a box has .125
 # probability that (1) holds without a process: with .8 exact intervals are as narrow as without sums
