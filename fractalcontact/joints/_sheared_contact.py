@@ -314,13 +314,15 @@ def _press_balanced(
 def check_pressed(problems: Problems) -> None:
     """Check that `pressed`, if any, is a result of `closure` for this crack, pressed in this way."""
     given = problems.given
-    if given.pressed is None or not isinstance(given.crack, Crack):
+    if given.pressed is None:
         return
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
     entry = provenance_of(given.pressed) if isinstance(given.pressed, xr.Dataset) else {}
-    others = differing(entry, {name: getattr(given, name) for name in ("crack", "bulk", *CONTACT_OPTIONS)})
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
-    if problems.require(is_closure, "pressed", expected):
+    if problems.require(is_closure, "pressed", expected) and isinstance(given.crack, Crack):
+        others = differing(
+            entry, {name: getattr(given, name) for name in ("crack", "bulk", *CONTACT_OPTIONS)}
+        )
         problems.require(not others, "pressed", expected, f"one with another {', '.join(others)}")
     problems.require(number_of_entries(given.keep) == 0, "pressed", "nothing beside `keep`")
 

@@ -55,7 +55,10 @@ def libraries():
 
 
 def kernels():
-    """Return for each compiled kernel the number of its argument types and of its compilations."""
+    """Return for each kernel that Python calls the number of its argument types and of its compilations.
+
+    Kernels that only kernels call are left out: they are compiled by themselves only where nothing is cached.
+    """
     if "numba" not in sys.modules:
         return {}
     from numba.core.dispatcher import Dispatcher
@@ -67,7 +70,9 @@ def kernels():
             sum(kernel.stats.cache_misses.values()),
         )
         for kernel in dispatchers
-        if kernel.overloads and kernel.py_func.__module__.startswith(PACKAGE)
+        if kernel.overloads
+        and kernel.py_func.__module__.startswith(PACKAGE)
+        and not kernel.targetoptions.get("no_cpython_wrapper")
     }
 
 
