@@ -160,15 +160,13 @@ def pair_correlation_length(planes: Planes, plane: int) -> Array:
         return np.full(1 + BLOCKS * BLOCKS, np.nan)
     r = int(below[0])
     ends = [np.arange(BLOCKS + 1) * n // BLOCKS for n in grid.shape]
-    blocks = np.array(
-        [
-            _in_rings(_block_pairs(planes, plane, _reaches(grid, (r + 1) * side), (y, x)), grid)[
-                :, [0, r - 1, r]
-            ]
-            for y in map(slice, ends[0], ends[0][1:])
-            for x in map(slice, ends[1], ends[1][1:])
-        ]
-    )
+    reaches = _reaches(grid, (r + 1) * side)
+    by_lag = [
+        _block_pairs(planes, plane, reaches, (y, x))
+        for y in map(slice, ends[0], ends[0][1:])
+        for x in map(slice, ends[1], ends[1][1:])
+    ]
+    blocks = _in_rings(np.concatenate(by_lag), grid)[:, [0, r - 1, r]].reshape(-1, 2, 3)
     total = blocks.sum(0)
     left = np.concatenate([total[None], total - blocks])
     with np.errstate(divide="ignore", invalid="ignore"):
