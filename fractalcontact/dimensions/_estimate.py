@@ -84,7 +84,7 @@ def _check(problems: Problems) -> None:
     title="Hurst exponent and fractal dimension of a surface",
     check=_check,
     in_blocks=True,
-    memory=ALL_HEIGHTS,  # of the likelihood, 88 to 156 as measured; other methods take less
+    memory=ALL_HEIGHTS,  # of the likelihood, 61 to 102 as measured, 169 beside gaps; others take less
 )
 def estimate(
     surface: xr.DataArray,
