@@ -240,7 +240,7 @@ def _check_words(problems: Problems, path: str, dataset: xr.Dataset) -> None:
 
 
 def _require_name(problems: Problems, place: str, name: object) -> None:
-    """Note a name that a NetCDF file cannot hold, or just can: NC_MAX_NAME is 256 bytes."""
+    """Note a name that a NetCDF file cannot hold. Its limit, NC_MAX_NAME, is 256 bytes; we stay below it."""
     is_name = isinstance(name, str) and "/" not in name and 0 < len(name.encode()) <= 255
     problems.require(is_name, place, "a name of 1 to 255 bytes without '/'", name)
 

@@ -191,9 +191,10 @@ def _sets(found: Sequence[Wave], shape: tuple[int, ...], highest: int = 24) -> l
 
 
 def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
-    """Return the single waves of a complete surface or profile, the strongest first, and its other heights.
+    """Return the single waves of a complete surface or profile, the strongest first, and what else it has.
 
-    None if there are more than a few dozen. Blocks of equal heights are periodic, but no waves.
+    The heights without the waves are also without their mean plane. More than a few dozen waves are none, and
+    the heights are then returned as they are. Blocks of equal heights are periodic, but no waves.
     """
     shape = surface.shape
     crop = tuple(slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for n in shape)
@@ -349,9 +350,8 @@ class Search:
         around = math.prod(self.box) - math.prod(self.gap)
         # modes under a taper are correlated: so many of them are independent
         freedom = around * math.prod(float(np.mean(t**2) ** 2 / np.mean(t**4)) for t in self.tapers)
-        level = np.maximum(
-            (box - gap) / around, 1.0
-        )  # that of the ring: beyond the end of a band are no modes
+        # the level of the ring is 1 and the least: beyond the end of a band are no modes
+        level = np.maximum((box - gap) / around, 1.0)
         tail = freedom * np.log1p(ratio / (level * freedom))
         return np.asarray(tail[:, _MARGIN:-_MARGIN])
 
