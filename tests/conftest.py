@@ -1,6 +1,7 @@
 """Options and fixtures that every test may use."""
 
 import copy
+import datetime
 import functools
 import gc
 import inspect
@@ -27,6 +28,14 @@ def pytest_addoption(parser):
         default=bool(os.environ.get(STRICT)),
         help=f"fail every test that is skipped for a missing library or missing data (or set {STRICT}=1)",
     )
+    parser.addoption("--seed", type=int, default=int(f"{datetime.date.today():%Y%m%d}"), help="of tests/fuzz")
+    more = "draw N times as many damaged calls, files and scenes"
+    parser.addoption("--fuzz", type=int, default=1, metavar="N", help=more)
+
+
+def pytest_report_header(config):
+    """Print the seed at the head of a run."""
+    return f"tests/fuzz: --seed={config.getoption('--seed')}"
 
 
 def _fail_if_skipped(report, config):

@@ -1,7 +1,6 @@
 """Values that no argument expects, and damaged arrays; every choice is made by a function `pick`.
 
-`pick` takes a sequence and returns one of its entries: `random.Random(seed).choice`,
-or a draw of hypothesis.
+`pick` takes a sequence and returns one of its entries: `random.Random(seed).choice`.
 """
 
 import datetime
@@ -12,10 +11,7 @@ import uuid
 
 import numpy as np
 import xarray as xr
-from hypothesis import HealthCheck
 
-# of every property-based test: a call may be slow, and what was found before is kept in the tests themselves
-SETTINGS = {"deadline": None, "suppress_health_check": list(HealthCheck), "database": None}
 HUGE = 10**400
 NOW = datetime.datetime(2026, 1, 2, 3, 4, 5)
 

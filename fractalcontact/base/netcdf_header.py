@@ -71,7 +71,7 @@ def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> d
     try:
         with NETCDF_LOCK, netCDF4.Dataset(source) as file:
             walk(file, "")
-    except (OSError, RuntimeError) as error:
+    except (OSError, RuntimeError, ValueError) as error:  # the last for names that are not UTF-8
         raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
     return groups
 

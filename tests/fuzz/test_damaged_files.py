@@ -1,25 +1,17 @@
-"""Damaged files through everything that reads files: a clear error, or a result and no other file.
+"""Damaged files through everything that reads files: a clear error, or a result and no other file."""
 
-Part of a minute with the other tests; `pytest -m fuzz -n2` takes about an hour with the calls and scenes. A
-failure prints the seed of its run (`--hypothesis-seed`) and the smallest damage.
-"""
-
-import random
 import struct
 import tempfile
 from pathlib import Path
 
 import pytest
 from fuzz_files import FILES, READERS, content, damaged_file, fault_of_file, names
-from fuzz_values import SETTINGS
-from hypothesis import given, settings, strategies
 
 import fractalcontact as fc
 from fractalcontact.base.errors import UnreadableFile
 
 # rasterio prints an exception where it cannot decode what GDAL says of a damaged file
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-QUICK, LONG = 100, 30_000
 
 
 def check(pick):
@@ -31,24 +23,8 @@ def check(pick):
     assert not stray, f"{reader}({name}), {done}: wrote {stray}"
 
 
-@settings(max_examples=QUICK, derandomize=True, **SETTINGS)
-@given(strategies.data())
-def test_damaged_file(data):
-    check(lambda options: data.draw(strategies.sampled_from(options)))
-
-
-@pytest.mark.fuzz
-@settings(max_examples=LONG, **SETTINGS)
-@given(strategies.data())
-def test_damaged_files_for_an_hour(data):
-    check(lambda options: data.draw(strategies.sampled_from(options)))
-
-
-@pytest.mark.parametrize("seed", [1, 2])
-def test_random_files(seed):
-    stream = random.Random(seed)
-    for _ in range(100):
-        check(stream.choice)
+def test_damaged_files(draw):
+    draw(check, times=100)
 
 
 @pytest.mark.parametrize("name", sorted(set(FILES) - {"a.png", "study.nc", "c.nc", "a.nc"}))
@@ -93,3 +69,10 @@ def test_chunks_beyond_a_packed_point_cloud_are_refused(tmp_path):
     (tmp_path / "a.laz").write_bytes(data)
     with pytest.raises(UnreadableFile, match="4294967295 chunks"):
         fc.surfaces.read(tmp_path / "a.laz")
+
+
+@pytest.mark.parametrize("reader", ["open", "scenes.contents"])
+def test_names_that_are_no_words_are_refused(tmp_path, reader):
+    (tmp_path / "b.nc").write_bytes(content("b.nc").replace(b"height", b"\xcdeight"))
+    with pytest.raises(UnreadableFile, match="'b.nc' is damaged"):
+        READERS[reader](tmp_path / "b.nc")

@@ -1,10 +1,5 @@
-"""Damaged scene files through `fractalcontact.scenes.run`: a clear error, or a result and no other file.
+"""Damaged scene files through `fractalcontact.scenes.run`: a clear error, or a result and no other file."""
 
-Half a minute with the other tests; `pytest -m fuzz -n2` takes about an hour. A failure prints the seed of its
-run (`--hypothesis-seed`) and the smallest scene.
-"""
-
-import random
 import shutil
 import tempfile
 from pathlib import Path
@@ -13,13 +8,9 @@ import numpy as np
 import pytest
 from calls import rough
 from fuzz_scenes import SCENES, damaged_text, fault_of_scene, toml_of
-from fuzz_values import SETTINGS
-from hypothesis import given, settings, strategies
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-
-QUICK, LONG = 60, 20_000
 
 
 def fault(source):
@@ -40,24 +31,8 @@ def check(pick):
     assert found is None, f"{done}: {found}"
 
 
-@settings(max_examples=QUICK, derandomize=True, **SETTINGS)
-@given(strategies.data())
-def test_damaged_scene(data):
-    check(lambda options: data.draw(strategies.sampled_from(options)))
-
-
-@pytest.mark.fuzz
-@settings(max_examples=LONG, **SETTINGS)
-@given(strategies.data())
-def test_damaged_scenes_for_an_hour(data):
-    check(lambda options: data.draw(strategies.sampled_from(options)))
-
-
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_random_scenes(seed):
-    stream = random.Random(seed)
-    for _ in range(40):
-        check(stream.choice)
+def test_damaged_scenes(draw):
+    draw(check, times=40)
 
 
 def refused(name, tmp_path, *replacements, **changes):
