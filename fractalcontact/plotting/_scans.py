@@ -52,7 +52,7 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
     >>> fc.plotting.scans(overview)[0].get_xlabel()
     'height Sq (µm)'
     """
-    data = result_of(overview, (), (SCAN,), units)
+    data = result_of(overview, (), (SCAN,), units, "overview")
     if JRC in data:
         data = data.assign({JRC: data[JRC].where(data[JRC] >= 0)})
     columns = {str(name): values for name, values in data.data_vars.items() if values.dims == (SCAN,)}

@@ -77,6 +77,11 @@ def export(
         raise MissingExtra("VTK image data", "pyevtk", "vtk")
     if isinstance(result, xr.DataArray):
         result = result.to_dataset(name="values" if result.name is None else result.name)
+    with Problems(WHERE) as problems:
+        for _, dataset in groups_of(result):
+            for dim in sorted(MAP_DIMS & set(dataset.coords)):
+                kind = dataset[dim].dtype
+                problems.require(kind.kind in "iuf", f"result.{dim}", "numbers in metres", f"type {kind}")
     if isinstance(result, xr.DataTree):
         result = result.map_over_datasets(_ascending)
     else:

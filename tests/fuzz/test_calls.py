@@ -18,6 +18,7 @@ from calls import (
     estimators,
     file,
     function_of,
+    overview,
     periodic,
     pressed,
     rough,
@@ -136,6 +137,10 @@ KEPT = {
         rough(48)).isel(wavelength=slice(0)), "result.wavelength"),
     "no sizes in a figure": ("plotting.estimator_errors", "bench", lambda: estimators().isel(size=slice(0)),
                              "bench.size"),
+    "words as coordinates of maps": ("scenes.export", "result", lambda: with_coordinate(
+        rough(), "y", [f"c{k}" for k in NUMBERS]), "result.y"),
+    "words as numbers of scans": ("plotting.scans", "overview", lambda: overview().assign(
+        rms_height=("scan", ["a", "b", "c"])), "overview.rms_height"),
     "azimuth in time": ("joints.direct_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
 }  # fmt: skip
 
