@@ -36,6 +36,8 @@ def _check(problems: Problems) -> None:
     problems.choices("keep", among=CONTACT_MAPS, optional=True)
     problems.choices("include", among=INCLUDE)
     check_problem(problems, leading=True)
+    dims = getattr(problems.given.surface, "dims", ())
+    problems.require("step" not in dims, "surface.dims", "no dim step, along which the loads are", dims)
 
 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:

@@ -45,7 +45,7 @@ def _check(problems: Problems) -> None:
         if is_common:
             with problems.collect("scans: "):
                 estimate.validate(each)
-        elif isinstance(given.method, str):
+        elif problems.result("scans", each) and isinstance(given.method, str):
             problems.choice("method", among=[str(name) for name in each["method"].values])
     expected = "None (a common exponent is that of the likelihood)" if is_common else "a name"
     problems.require(

@@ -100,7 +100,7 @@ def _is_number(value: Any) -> bool:
 
 def _are_numbers(value: Any) -> bool:
     values = real_numbers(value) if isinstance(value, (list, tuple, np.ndarray)) else None
-    return values is not None and values.ndim == 1 and bool(np.isfinite(values).all())
+    return values is not None and np.ndim(value) == 1 and bool(np.isfinite(values).all())
 
 
 def _are_ends(value: Any) -> bool:

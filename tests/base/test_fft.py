@@ -19,7 +19,7 @@ import numpy as np
 from fractalcontact.base import fft
 
 random = np.random.default_rng(7)
-SHAPES = (3, 5), (1, 4), (401, 367), (33, 4100), (4100, 33), (2, 360, 370), (70_000,)
+SHAPES = (3, 5), (1, 4), (331, 317), (25, 4100), (4100, 25), (2, 230, 240), (70_000,)
 for library, shape, dtype in itertools.product(sys.argv[1:], SHAPES, (np.float32, np.float64)):
     os.environ["FRACTALCONTACT_FFT"] = library
     assert fft.library() == library

@@ -15,6 +15,7 @@ from calls import (
     LEFT_OUT,
     REFUSED,
     closed,
+    estimates,
     estimators,
     file,
     function_of,
@@ -141,6 +142,11 @@ KEPT = {
         rough(), "y", [f"c{k}" for k in NUMBERS]), "result.y"),
     "words as numbers of scans": ("plotting.scans", "overview", lambda: overview().assign(
         rms_height=("scan", ["a", "b", "c"])), "overview.rms_height"),
+    "surfaces over steps": ("contact.press", "surface", lambda: periodic().expand_dims(step=[1]),
+                            "surface.dims"),
+    "one number as those marked": ("plotting.dilatancy", "marked", lambda: np.array(1.0), "marked"),
+    "words as errors of scans": ("dimensions.pool", "scans", lambda: estimates().assign(
+        standard_error=("method", ["a", "b"])), "scans.standard_error"),
     "azimuth in time": ("joints.direct_shear", "direction", lambda: np.timedelta64(1, "s"), "direction"),
 }  # fmt: skip
 
