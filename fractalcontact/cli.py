@@ -26,9 +26,9 @@ from fractalcontact.base.errors import (
     ScaleWarning,
     TooLittleMemory,
 )
-from fractalcontact.base.file_patterns import is_pattern
-from fractalcontact.base.memory import require_libraries
+from fractalcontact.base.files import is_pattern
 from fractalcontact.base.process import block_dask_import, collect_rarely
+from fractalcontact.base.resources import require_libraries
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
@@ -307,7 +307,7 @@ def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.
 
     from fractalcontact import dimensions, joints, save, scenes, surfaces
     from fractalcontact import open as open_result
-    from fractalcontact.base.output_folder import RESULT
+    from fractalcontact.base.files import RESULT
 
     title, target = f"Roughness of the profile {name}", folder / RESULT
     if target.exists() and not options.force and open_result(target).attrs.get("title") != title:
@@ -341,7 +341,7 @@ def _is_unedited(text: str) -> bool:
 
 def _init(options: argparse.Namespace) -> int:
     """Write a commented scene and the schema that its first line names; an existing scene stays."""
-    from fractalcontact.base.datasets import SCHEMA, datasets_folder
+    from fractalcontact.base.files import SCHEMA, datasets_folder
 
     target = Path(options.scene)
     if target.exists() or not target.parent.is_dir():
@@ -355,8 +355,8 @@ def _init(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     from fractalcontact import scenes
-    from fractalcontact.base.output_folder import RESULT
-    from fractalcontact.base.threads import most_workers
+    from fractalcontact.base.files import RESULT
+    from fractalcontact.base.resources import most_workers
     from fractalcontact.base.validation import Problems
 
     if options.plan:
@@ -414,7 +414,7 @@ def _memory() -> str:
 
 def _accuracy(options: argparse.Namespace) -> int:
     if options.out is not None:
-        from fractalcontact.base.output_folder import output_folder
+        from fractalcontact.base.files import output_folder
 
         output_folder(options.out)  # before the measuring, not after it
     if options.names == ["estimators"]:
@@ -448,8 +448,8 @@ def _write_figure(axes: Any, path: Path) -> None:
 
 def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
     """Save a result and return the name of the file, which is another one where the run was stopped."""
+    from fractalcontact.base.files import PARTIAL_RESULT
     from fractalcontact.base.netcdf import save
-    from fractalcontact.base.output_folder import PARTIAL_RESULT
 
     if stop:
         return save(result, target.with_name(PARTIAL_RESULT)).name

@@ -26,7 +26,7 @@ from calls import crack, labelled_functions, measured, rough
 from study import SOUND
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 
 SCENE = SOUND.replace("[48, 48]", "[24, 24]").replace("2.4e-3", "1e-3")
 SCENE += 'dimensions = ["variogram"]\nfigures = true\n'
@@ -166,7 +166,7 @@ def prepare():
     """Run even small loops in bands of three threads."""
     warnings.simplefilter("ignore")
     os.environ["FRACTALCONTACT_THREADS"] = "3"
-    threads.SHARE = 256
+    resources.SHARE = 256
 
 
 def send(connection, expected):

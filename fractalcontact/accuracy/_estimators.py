@@ -23,10 +23,10 @@ from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.netcdf import open as read
 from fractalcontact.base.netcdf import save
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import label
+from fractalcontact.base.signals import track
 from fractalcontact.base.validation import NONE, Problems, word_tuple
 
 Stream = np.random.Generator

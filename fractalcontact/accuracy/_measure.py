@@ -14,10 +14,9 @@ import xarray as xr
 from fractalcontact.accuracy._benchmarks import SUBPACKAGES, Benchmark, Method, benchmarks
 from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.schema import label
-from fractalcontact.base.signals import Stop
+from fractalcontact.base.signals import Stop, track
 from fractalcontact.base.validation import Problems, word_tuple
 
 WHERE = "fractalcontact.accuracy.measure"

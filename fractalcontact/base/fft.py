@@ -15,9 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.threads import in_bands, thread_count
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
+from fractalcontact.base.resources import in_bands, thread_count
 
 SMALL = 1 << 16  # elements up to which a transform is a single call of ducc0: too few for two threads
 GROUP = 16  # lines: a multiple of the number that ducc0 transforms together
@@ -198,7 +197,7 @@ def _ducc0() -> Any:
 
 
 def _along(call: Any, array: Array, axis: int, out: Array, **options: Any) -> Array:
-    """Transform all lines along one axis into `out` with ducc0, on the threads of `base.threads`.
+    """Transform all lines along one axis into `out` with ducc0, on the threads of `base.resources`.
 
     ducc0 transforms lines together in groups and the remaining ones singly, with different rounding. Its own
     threads split the groups, which changes bits with their number; here a plane is split between groups only.

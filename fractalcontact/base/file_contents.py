@@ -1,4 +1,4 @@
-"""The contents of a result file as text: groups, variables, achieved errors and run times.
+"""The contents of a result file: its headers, and as text groups, variables, achieved errors and run times.
 
 Nothing here needs xarray, so that the command starts fast.
 """
@@ -7,17 +7,80 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.netcdf_header import Header, read_headers
-from fractalcontact.base.references import provenance_of
+from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.files import DAMAGED, NETCDF_LOCK, require_checksum
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.tables import Note, screen_width, table
+from fractalcontact.base.validation import Problems, reading
 
 SHARED = "parts that ran at the same time are each counted in full, so that all stages exceed the total"
 REMARKS = ("note", "reason")  # string variables over `method`
+
+
+@dataclass(frozen=True)
+class Header:
+    """Header of a group: its attributes, sizes and attributes of each variable, and some values."""
+
+    attrs: dict[str, Any]
+    variables: dict[str, tuple[dict[str, int], dict[str, Any]]]
+    values: dict[str, Any]
+
+
+def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> dict[str, Header]:
+    """Return the header of every group of a file, with the values of the variables selected by `read`.
+
+    Raises
+    ------
+    UnreadableFile
+        The file does not exist, is truncated or damaged, or is not NetCDF.
+    """
+    import netCDF4  # loads slowly
+
+    where = "fractalcontact.open"
+    with Problems(where, UnreadableFile) as problems:
+        problems.file("path", path)
+    source = Path(path)
+    groups: dict[str, Header] = {}
+
+    def walk(group: Any, name_of_group: str) -> None:
+        groups[name_of_group or "/"] = Header(
+            dict(group.__dict__),
+            {
+                str(name): (_sizes(variable), dict(variable.__dict__))
+                for name, variable in group.variables.items()
+            },
+            {
+                str(name): variable[...]
+                for name, variable in group.variables.items()
+                if getattr(variable.dtype, "kind", "O") in "biufOS" and read(str(name))
+            },
+        )
+        for name, child in group.groups.items():
+            walk(child, f"{name_of_group}/{name}")
+
+    with reading(where, source):
+        require_checksum(where, source)
+    try:
+        with NETCDF_LOCK, netCDF4.Dataset(source) as file:
+            walk(file, "")
+    except (OSError, RuntimeError, ValueError) as error:  # the last for names that are not UTF-8
+        raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
+    return groups
+
+
+def _sizes(variable: Any) -> dict[str, int]:
+    """Return dims and lengths, without the dim of the characters of a string."""
+    sizes = dict(zip(variable.dimensions, map(int, variable.shape), strict=True))
+    return {
+        dim: size for dim, size in sizes.items() if not (variable.dtype == "S1" and dim.startswith("string"))
+    }
 
 
 def file_contents(path: str | os.PathLike[str]) -> str:

@@ -1,8 +1,9 @@
-"""Uniform grids: cell centres, spacing, periodicity, and the faults of a surface or mask on a grid.
+"""Uniform grids: cell centres, spacing, periodicity, and the faults of a surface, mask or result.
 
 The coordinate of an axis holds the centres of its cells, ascending and uniform, in metres; the extent is
 n * spacing. A periodic axis has the attribute `period` in metres. It counts as periodic only while
-period = n * spacing, so that a crop is not periodic.
+period = n * spacing, so that a crop is not periodic. A result may come from a file or from a user's own
+arithmetic, which can drop units, turn numbers into objects or select nothing along a dim.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.memory import has_blocks
-from fractalcontact.base.numbers import is_real
+from fractalcontact.base.numbers import Array, is_real
+from fractalcontact.base.resources import has_blocks
+from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, Quantity
 
 # largest distance of a centre from its place on a uniform axis, in spacings: a height is then off by 1e-6 of
 # its increment
@@ -26,7 +28,10 @@ DECADES = 100  # squares and cubes of lengths between 1e-100 and 1e100 m can be 
 # and Molinari 2017)
 EXCESS_PER_EDGE = (math.pi - 1.0 + math.log(2.0)) / 24.0
 METRES = ("m", "meter", "metre", "meters", "metres")
-Array = np.ndarray[Any, np.dtype[Any]]
+PATH_DIMS = (
+    *("member", "direction", "shear", "step", "axis", "method", "azimuth", "wavelength", "structure_size"),
+    *CORE_DIMS,
+)
 Fault = tuple[str, str, object]  # argument, what is expected, what is given
 
 
@@ -288,3 +293,40 @@ def _within(length: float, decades: int) -> bool:
 
 def _decades(decades: int) -> str:
     return f"1e-{decades} to 1e{decades} m"
+
+
+def tree_faults(value: Any, argument: str) -> Iterator[Fault]:
+    """Yield a fault where a value is not the DataTree of a study."""
+    if not isinstance(value, xr.DataTree):
+        yield argument, "a DataTree, from fractalcontact.scenes.run or fractalcontact.open", value
+
+
+def result_faults(data: Any, argument: str) -> Iterator[Fault]:
+    """Yield the faults of the variables whose names the schema has; others are not looked at."""
+    if not isinstance(data, xr.Dataset):
+        yield argument, "a Dataset, the result of a public function", data
+        return
+    for dim in PATH_DIMS:
+        if data.sizes.get(dim) == 0:
+            yield f"{argument}.{dim}", "at least one entry", "none"
+    for name, variable in data.variables.items():
+        quantity = QUANTITIES.get(str(name))
+        if quantity is None or name in CORE_DIMS:
+            continue
+        expected, kinds = ("words", "USO") if quantity.units is None else ("real numbers", "biuf")
+        if variable.dtype.kind not in kinds:
+            yield f"{argument}.{name}", expected, f"type {variable.dtype}"
+        units = variable.attrs.get("units", quantity.units)
+        if quantity.units is not None and not _is_unit_of(units, quantity):
+            yield f"{argument}.{name}.units", repr(quantity.units), units
+        if not isinstance(variable.attrs.get("long_name", ""), str):
+            yield f"{argument}.{name}.long_name", "words", variable.attrs["long_name"]
+    for dim in CORE_DIMS:
+        if dim in data.dims and dim in data.coords and data.sizes[dim] > 1:
+            yield from axis_faults(data, dim, f"{argument}.{dim}")
+
+
+def _is_unit_of(units: Any, quantity: Quantity) -> bool:
+    if not isinstance(units, str):
+        return False
+    return units in (quantity.units, *quantity.other_units) or (quantity.units == "m" and units in METRES)

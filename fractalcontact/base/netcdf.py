@@ -13,9 +13,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
-import platform
 import shutil
-import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -24,15 +22,20 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
-from fractalcontact.base.memory import require_unpacked, unpacked_limit
-from fractalcontact.base.netcdf_header import DAMAGED, append_checksum, require_checksum
-from fractalcontact.base.netcdf_lock import NETCDF_LOCK
+from fractalcontact.base.files import (
+    DAMAGED,
+    NETCDF_LOCK,
+    append_checksum,
+    clear_partial,
+    require_checksum,
+    written_whole,
+)
 from fractalcontact.base.provenance import with_load_indexes
+from fractalcontact.base.resources import require_unpacked, unpacked_limit
 from fractalcontact.base.schema import CONVENTIONS, encoded
 from fractalcontact.base.validation import Problems, reading
 
 SAVE = "fractalcontact.save"
-PARTIAL = ".partial"
 # attributes by which a file is unpacked as it is read; left by another reader, they would change the values
 PACKING = ("scale_factor", "add_offset", "_FillValue", "missing_value", "_Unsigned")
 _TYPE = "fractalcontact_kind"
@@ -404,47 +407,6 @@ def as_dataset(array: xr.DataArray) -> xr.Dataset:
     dataset[name].encoding = dict(array.encoding)
     dataset.attrs = {key: array.attrs[key] for key in _GLOBAL if key in array.attrs}
     return dataset
-
-
-@contextlib.contextmanager
-def written_whole(target: Path) -> Iterator[Path]:
-    """Yield a temporary name to write to; the file gets its own name when it is complete."""
-    temporary = _unfinished(target)
-    try:
-        yield temporary
-        temporary.replace(target)
-    finally:
-        if target.parent.is_dir():
-            temporary.unlink(missing_ok=True)
-
-
-def _unfinished(target: Path) -> Path:
-    """Return the temporary name under which this thread of this process writes a file."""
-    place = f"{_machine()}.{threading.get_native_id()}.{os.getpid()}"
-    return target.with_name(f".{target.name}.{place}{PARTIAL}")
-
-
-def clear_partial(folder: Path) -> None:
-    """Remove the temporary files of processes of this machine that have ended."""
-    for leftover in folder.glob(f".*.{_machine()}.*{PARTIAL}"):
-        number = leftover.name.removesuffix(PARTIAL).rpartition(".")[2]
-        if number.isdigit() and int(number) != os.getpid() and not _alive(int(number)):
-            leftover.unlink(missing_ok=True)
-
-
-def _machine() -> str:
-    """Return the name of this machine: process numbers of machines that share a folder may coincide."""
-    return "".join(letter for letter in platform.node() if letter.isalnum() or letter == "-") or "here"
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OSError):
-        return True
-    return True
 
 
 def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:

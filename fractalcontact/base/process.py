@@ -19,8 +19,8 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from fractalcontact.base import threads
-from fractalcontact.base.memory import free_memory
+from fractalcontact.base import resources
+from fractalcontact.base.resources import free_memory
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -129,11 +129,11 @@ def can_fork() -> bool:
     from multiprocessing import parent_process
 
     own = threading.main_thread()
-    if sys.platform != "linux" or threading.current_thread() is not own or threads.thread_count() < 2:
+    if sys.platform != "linux" or threading.current_thread() is not own or resources.thread_count() < 2:
         return False
     if parent_process() is not None:  # a worker: the others use the processors
         return False
-    others = (each for each in threading.enumerate() if each is not own and each.name != threads.NAME)
+    others = (each for each in threading.enumerate() if each is not own and each.name != resources.NAME)
     is_alone = all(type(each).__name__ == "TMonitor" for each in others)
     return is_alone and free_memory().size > COPY_MEMORY
 

@@ -19,10 +19,9 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base import rng as streams
-from fractalcontact.base.references import NO_REFERENCES
+from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CONVENTIONS
-from fractalcontact.base.study import MEMBER
-from fractalcontact.base.threads import thread_count
+from fractalcontact.base.study import MEMBER, NO_REFERENCES
 
 LOADS = ("closure", "normal_force", "nominal_pressure")
 SHARED = "pressed"  # the argument of which every part takes what it needs: the whole is that of any part

@@ -1,14 +1,31 @@
-"""SIGINT and SIGTERM: the first one finishes the current task, a second one stops at once."""
+"""Signals of long work: a bar of its progress, and SIGINT and SIGTERM.
+
+The first signal finishes the current task, a second one stops at once.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def track(
+    items: Iterable[T], enabled: bool, description: str, *, unit: str = "step", total: int | None = None
+) -> Iterable[T]:
+    """Iterate over `items`; show a bar if `enabled` and the loop takes longer than a second."""
+    if not enabled:
+        return items
+    from tqdm import tqdm
+
+    return tqdm(items, desc=description, unit=unit, total=total, dynamic_ncols=True, delay=1.0, leave=False)
+
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 

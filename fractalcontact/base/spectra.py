@@ -13,13 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fractalcontact.base import fft
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
 
 
 def half_weights(nx: int) -> Array:

@@ -1,4 +1,4 @@
-"""Numbers beside units, in text and on axes: the SI prefix that suits the values, and few digits."""
+"""Units: lengths in metres, and numbers beside units with the SI prefix that suits them and few digits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,41 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
+
+# units per metre, or metres per unit: whichever is an integer, so that the conversion rounds only once
+PER_METRE = {"dm": 1e1, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "angstrom": 1e10, "pm": 1e12}
+METRES = {"m": 1.0, "km": 1e3, "inch": 0.0254}
+SPELLINGS = {
+    "\u00b5m": "um",  # the micro sign
+    "\u03bcm": "um",  # the Greek letter
+    "micron": "um",
+    "microns": "um",
+    "micrometer": "um",
+    "micrometre": "um",
+    "millimeter": "mm",
+    "millimetre": "mm",
+    "nanometer": "nm",
+    "nanometre": "nm",
+    "meter": "m",
+    "metre": "m",
+    "\u212b": "angstrom",  # the Angstrom sign
+    "\u00c5": "angstrom",  # the letter
+    "Angstrom": "angstrom",
+    "A": "angstrom",
+    "in": "inch",
+    "inches": "inch",
+}
+UNITS = (*METRES, *PER_METRE, *SPELLINGS)
+
+
+def in_metres(values: Any, units: str) -> Any:
+    """Convert values from `units`, one of UNITS, to metres."""
+    name = SPELLINGS.get(units, units)
+    if name in METRES:
+        return values if name == "m" else values * METRES[name]
+    return values / PER_METRE[name]
+
 
 PREFIXES = {
     18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"

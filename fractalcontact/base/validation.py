@@ -307,13 +307,13 @@ class Problems:
 
     def tree(self, argument: str, value: Any = GIVEN) -> bool:
         """Check for the DataTree of a study."""
-        from fractalcontact.base.labelled import tree_faults  # loads xarray
+        from fractalcontact.base.grid import tree_faults  # loads xarray
 
         return self._add_all(tree_faults(self._value(argument, value), argument))
 
     def result(self, argument: str, value: Any = GIVEN) -> bool:
         """Check that a labelled result has the dims, types and units of the schema."""
-        from fractalcontact.base.labelled import result_faults  # loads xarray
+        from fractalcontact.base.grid import result_faults  # loads xarray
 
         return self._add_all(result_faults(self._value(argument, value), argument))
 

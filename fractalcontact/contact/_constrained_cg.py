@@ -82,7 +82,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.threads import in_bands
+from fractalcontact.base.resources import in_bands
 from fractalcontact.contact import _kernels
 from fractalcontact.contact._capped_simplex import (
     project_onto_capped_simplex,

@@ -35,7 +35,7 @@ def square_coefficients(shape: tuple[int, int], spacing: tuple[float, float]) ->
     Shape (ny, nx), 1/m for a modulus of 1. Near cells by the closed form, far ones by Gauss quadrature,
     because the closed form loses digits with the square of the distance.
     """
-    from fractalcontact.base.threads import in_bands
+    from fractalcontact.base.resources import in_bands
     from fractalcontact.contact._kernels import love_table
 
     table = np.empty(shape)

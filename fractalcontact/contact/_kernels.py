@@ -1,7 +1,7 @@
 """Compiled loops of the contact solver: influence coefficients and the fused passes of the iteration.
 
-Every pass of the iteration runs over bands of blocks (`base.threads.in_bands`); a block is as many rows as a
-bin of the preconditioner. The sums of a block go to its row of `out` and are added up by the caller, block
+Every pass of the iteration runs over bands of blocks (`base.resources.in_bands`); a block is as many rows as
+a bin of the preconditioner. The sums of a block go to its row of `out` and are added up by the caller, block
 after block, so that they do not depend on the number of threads. The inner loops have no branches, so that
 they are vectorised.
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.threads import in_bands
+from fractalcontact.base.resources import in_bands
 
 SMALL = 128 * 128  # nodes up to which tables of the modes are kept, also for the next call
 NO_WORK: Array = np.empty(0)  # of a filter whose work is not asked for

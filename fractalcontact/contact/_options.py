@@ -10,8 +10,8 @@ import numpy as np
 
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.references import PAPER, joined_references
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
+from fractalcontact.base.study import PAPER, joined_references
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._scaled_problem import make_units

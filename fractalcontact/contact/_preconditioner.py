@@ -26,7 +26,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.threads import in_bands
+from fractalcontact.base.resources import in_bands
 from fractalcontact.contact._operator import PairSum, WavenumberMultiplier
 from fractalcontact.contact._scaled_problem import Body
 

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.memory import Plane
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.progress import track
+from fractalcontact.base.resources import SHARE, Plane, in_bands, limit, thread_count
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
-from fractalcontact.base.threads import SHARE, in_bands, limit, thread_count
+from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
 from fractalcontact.contact.solver import PRESSURE_CLASSES, Pressed, rms_slope, solve, warn_steep

@@ -17,7 +17,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.threads import in_bands
+from fractalcontact.base.resources import in_bands
 from fractalcontact.contact._operator import convolution_symbol, padded_length
 from fractalcontact.contact._preconditioner import DECAY, FADE, bin_layout
 from fractalcontact.contact._scaled_problem import Body

@@ -23,8 +23,8 @@ import numpy as np
 from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning, warn
 from fractalcontact.base.grid import EXCESS_PER_EDGE, Grid, contact_edges
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.progress import track
 from fractalcontact.base.schema import CONTACT, OPEN, SLIP_MAPS, STEEP, STOP_REASONS, YIELDED
+from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._flat_block import block_stiffness
 from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path

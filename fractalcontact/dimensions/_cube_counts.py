@@ -195,7 +195,7 @@ def _area_ratios(heights: Array, edges: Array, spacing: tuple[float, float]) -> 
     Cells of every position are used. For a profile (one row): the length of the chords over that of their
     plan.
     """
-    from fractalcontact.base.threads import in_bands
+    from fractalcontact.base.resources import in_bands
     from fractalcontact.dimensions._kernels import prism_sums
 
     ratios = np.empty(len(edges))

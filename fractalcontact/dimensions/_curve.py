@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._methods import Method, function
 from fractalcontact.dimensions._records import (

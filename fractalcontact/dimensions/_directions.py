@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_directions, read_directions
-from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions import _spectral_sectors as sectors

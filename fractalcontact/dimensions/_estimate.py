@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.memory import require_memory
-from fractalcontact.base.references import joined_references
+from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import announce_loading, public_result
+from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.dimensions._curve import fit
 from fractalcontact.dimensions._increments import increments

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights

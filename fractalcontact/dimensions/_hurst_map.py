@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import read_grid
-from fractalcontact.base.memory import has_blocks
+from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._increments import increments

@@ -207,7 +207,7 @@ def increment_moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...]
     stride : int
         Shortest lag in points.
     """
-    from fractalcontact.base.threads import in_bands
+    from fractalcontact.base.resources import in_bands
     from fractalcontact.dimensions._kernels import gapped_increment_sums, increment_sums
 
     block_rows, block_columns = _block_edges(shape, stride)

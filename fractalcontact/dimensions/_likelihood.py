@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.regression import detrended
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.units import quantity_text
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_step, unevenness

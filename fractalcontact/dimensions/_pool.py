@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.random_effects import random_effects
+from fractalcontact.base.regression import random_effects
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.dimensions._estimate import estimate

@@ -83,7 +83,7 @@ def roughness_length_curve(surface: Surface, window: Scales = None) -> Curve:
 
 def window_sums(heights: Array, size_y: int, size_x: int, *, is_square: bool) -> tuple[float, int]:
     """Return the sum of the rms heights about planes in windows, or of their squares, and their number."""
-    from fractalcontact.base.threads import in_bands
+    from fractalcontact.base.resources import in_bands
     from fractalcontact.dimensions._kernels import roughness_sums
 
     rows, columns = _starts(heights.shape[0], size_y), _starts(heights.shape[1], size_x)

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.power_law import logarithm
+from fractalcontact.base.regression import logarithm
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, PERIODIC, Curve, curve_dataset

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.memory import has_blocks
+from fractalcontact.base.labelled import check_leading
+from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.grid import read_grid
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
@@ -265,7 +265,7 @@ def mean_increments(
     measure : int
         `SQUARE`, `ABSOLUTE` or `SECOND`.
     """
-    from fractalcontact.base.threads import in_bands
+    from fractalcontact.base.resources import in_bands
     from fractalcontact.dimensions._kernels import pair_sums
 
     row_sums, counts = [], np.zeros(len(vectors), dtype=np.int64)

@@ -19,7 +19,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
-from fractalcontact.base.coords import leading_coords
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._spectrum import without_trend

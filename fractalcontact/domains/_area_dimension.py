@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import EXCESS_PER_EDGE, contact_edges
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.domains import _masks

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import float_array
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks, _random_null, _scaling_fit

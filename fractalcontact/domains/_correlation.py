@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import lagged_products
 from fractalcontact.base.validation import Problems

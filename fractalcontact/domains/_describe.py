@@ -9,10 +9,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
-from fractalcontact.base.missing_numbers import REASONS
-from fractalcontact.base.references import joined_references
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import REASONS, public_result
 from fractalcontact.base.schema import NOTES
+from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import (
     _boundary,

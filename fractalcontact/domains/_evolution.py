@@ -11,9 +11,9 @@ from scipy.ndimage import binary_erosion
 
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.provenance import differing
-from fractalcontact.base.references import joined_references, provenance_of
+from fractalcontact.base.resources import thread_count
 from fractalcontact.base.results import public_result
-from fractalcontact.base.threads import thread_count
+from fractalcontact.base.study import joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains import _signature
 from fractalcontact.domains._connected_components import Components, label_planes

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.memory import Plane
+from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains._connected_components import (

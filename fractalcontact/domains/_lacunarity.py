@@ -15,7 +15,7 @@ from scipy.special import stdtrit
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import inner_kernel, kernel, sum_kernel
-from fractalcontact.base.memory import Plane
+from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import ARRAYS, public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks

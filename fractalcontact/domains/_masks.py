@@ -16,13 +16,12 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.grid import Grid, periodic_axes, read_grid
-from fractalcontact.base.memory import has_blocks
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array as Array
 from fractalcontact.base.numbers import float_array
+from fractalcontact.base.resources import has_blocks, thread_count
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, in_cells
-from fractalcontact.base.threads import thread_count
 from fractalcontact.base.validation import GIVEN, LARGEST_INTEGER, Problems
 
 S = TypeVar("S")

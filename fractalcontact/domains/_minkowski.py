@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import float_array
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks

@@ -13,9 +13,9 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
+from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._sheared_contact import (

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning, warn
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import PREFERRED_LAW

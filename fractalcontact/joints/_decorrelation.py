@@ -21,9 +21,9 @@ from fractalcontact.base.compass import (
     read_directions,
 )
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.polynomial import detrended, rounding_of
-from fractalcontact.base.references import PAPER
+from fractalcontact.base.regression import detrended, rounding_of
 from fractalcontact.base.results import public_result
+from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, missing_heights

@@ -13,10 +13,9 @@ from fractalcontact.base.compass import read_direction
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.polynomial import rounding_of
-from fractalcontact.base.power_law import fit_line
-from fractalcontact.base.references import PAPER
+from fractalcontact.base.regression import fit_line, rounding_of
 from fractalcontact.base.results import public_result
+from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._delta_surface import delta_surface

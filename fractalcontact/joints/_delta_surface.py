@@ -18,8 +18,8 @@ from fractalcontact.base import fft
 from fractalcontact.base.compass import Direction, direction_coords, is_single, read_directions
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
+from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords, check_sliding
 

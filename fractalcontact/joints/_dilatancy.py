@@ -9,10 +9,10 @@ import xarray as xr
 
 from fractalcontact.base.compass import COMPASS, Direction, direction_coords, read_directions
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.polynomial import slopes
-from fractalcontact.base.references import PAPER
+from fractalcontact.base.regression import slopes
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE
+from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights

@@ -14,9 +14,9 @@ import xarray as xr
 from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.progress import track
-from fractalcontact.base.references import joined_references
 from fractalcontact.base.results import public_result
+from fractalcontact.base.signals import track
+from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._criteria import POSITIVE

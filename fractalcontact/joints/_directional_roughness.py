@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import ROUNDING, detrended, rounding_of, slopes
+from fractalcontact.base.regression import ROUNDING, detrended, rounding_of, slopes
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 

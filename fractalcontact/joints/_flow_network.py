@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.coords import check_leading
+from fractalcontact.base.labelled import check_leading
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
 

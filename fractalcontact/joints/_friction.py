@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import drop_unknown_coords
+from fractalcontact.base.labelled import drop_unknown_coords
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.units import quantity_text

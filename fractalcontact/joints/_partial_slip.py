@@ -12,10 +12,10 @@ import xarray as xr
 
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.progress import track
-from fractalcontact.base.references import PAPER
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
+from fractalcontact.base.signals import track
+from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing

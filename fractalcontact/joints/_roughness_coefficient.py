@@ -12,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.compass import Direction, check_directions, direction_coords, read_directions
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.regression import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.joints._criteria import LARGEST_JRC, SAMPLE_LENGTH, scaled_roughness

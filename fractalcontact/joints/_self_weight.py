@@ -11,10 +11,10 @@ import xarray as xr
 
 from fractalcontact.base.compass import COMPASS, direction_coords, read_directions
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.power_law import fit_line
-from fractalcontact.base.references import PAPER
+from fractalcontact.base.regression import fit_line
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
+from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import POSITIVE

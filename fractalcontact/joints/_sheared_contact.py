@@ -24,9 +24,9 @@ from fractalcontact.base.compass import Direction, direction_coords
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.numbers import Array, number_of_entries
-from fractalcontact.base.progress import track
 from fractalcontact.base.provenance import differing
-from fractalcontact.base.references import PAPER, joined_references, provenance_of
+from fractalcontact.base.signals import track
+from fractalcontact.base.study import PAPER, joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import leading_coords
 from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.grid import periodic_axes, read_grid
+from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple

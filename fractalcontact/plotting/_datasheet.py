@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.references import provenance_of
-from fractalcontact.base.study import group_of
+from fractalcontact.base.study import group_of, provenance_of
 from fractalcontact.base.units import Scale, jrc_text, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style

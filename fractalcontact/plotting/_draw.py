@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.netcdf import written_whole
+from fractalcontact.base.files import written_whole
 from fractalcontact.base.process import calls_in_two_processes
-from fractalcontact.base.progress import track
+from fractalcontact.base.resources import DRAWING_LOCK
+from fractalcontact.base.signals import track
 from fractalcontact.base.study import group_of, member_count
-from fractalcontact.base.threads import DRAWING_LOCK
 from fractalcontact.base.validation import Problems, writing
 from fractalcontact.plotting._closure import closure_laws
 from fractalcontact.plotting._contact_curves import area_dimension, contact_area, slip_loops

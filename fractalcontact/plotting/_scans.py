@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.robust import is_far
+from fractalcontact.base.regression import is_far
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.power_law import local_slope
+from fractalcontact.base.regression import local_slope
 from fractalcontact.base.units import Scale
 from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import figure

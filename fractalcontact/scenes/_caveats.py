@@ -9,9 +9,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import EXCESS_PER_EDGE
-from fractalcontact.base.references import scene_of
 from fractalcontact.base.schema import STEEP
-from fractalcontact.base.study import group_of
+from fractalcontact.base.study import group_of, scene_of
 from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
 from fractalcontact.scenes._joint_rows import aperture_as_placed
 from fractalcontact.scenes._overview import OVERVIEW

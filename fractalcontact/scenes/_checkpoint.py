@@ -23,7 +23,7 @@ import xarray as xr
 
 import fractalcontact
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.base.netcdf import clear_partial, written_whole
+from fractalcontact.base.files import clear_partial, written_whole
 from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import encoded
 from fractalcontact.scenes._inputs import locate

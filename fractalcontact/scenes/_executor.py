@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fractalcontact.base import signals, threads
+from fractalcontact.base import resources, signals
 from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.process import calls_in_two_processes, can_fork, end_with_parent
 from fractalcontact.scenes._checkpoint import MemoryStore, PartStore
@@ -146,10 +146,10 @@ def run_tasks(
         expected = (time.perf_counter() - start) * len(left)
         if result is not None:
             yield key, result
-    keys, half = list(left), threads.thread_count() // 2
+    keys, half = list(left), resources.thread_count() // 2
 
     def run_one(place: int) -> R | None:
-        with threads.limit(half):
+        with resources.limit(half):
             return left[keys[place]](store, stop)
 
     for place, result in calls_in_two_processes(run_one, len(keys)):
@@ -216,7 +216,7 @@ class _WorkerTask:
         """
         has_access = self.mark is None or self.mark.is_file()
         store = self.store if has_access else MemoryStore(self.kept)
-        with threads.limit(threads.requested_count() or 1):
+        with resources.limit(resources.requested_count() or 1):
             result = self.task(store, _MarkedStop(self.mark))
         return result, store.added if isinstance(store, MemoryStore) else {}
 

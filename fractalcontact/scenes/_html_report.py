@@ -19,13 +19,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.files import written_whole
 from fractalcontact.base.netcdf import open as open_result
-from fractalcontact.base.netcdf import written_whole
-from fractalcontact.base.power_law import local_slope
-from fractalcontact.base.references import provenance_of, scene_of
+from fractalcontact.base.regression import local_slope
+from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CORE_DIMS
-from fractalcontact.base.study import group_of, member_count, of_member
-from fractalcontact.base.threads import thread_count
+from fractalcontact.base.study import group_of, member_count, of_member, provenance_of, scene_of
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes import _domain_rows

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.references import joined_references
+from fractalcontact.base.files import datasets_folder
+from fractalcontact.base.study import joined_references
 from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._scene import OF_SURFACE, Scene, SurfaceTable

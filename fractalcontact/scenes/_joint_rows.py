@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.references import provenance_of
-from fractalcontact.base.study import MEMBER, group_of
+from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import jrc_text, number
 from fractalcontact.scenes._result_tables import (
     Column,

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import MissingExtra
-from fractalcontact.base.netcdf import written_whole
+from fractalcontact.base.files import written_whole
 from fractalcontact.base.validation import Problems, Words, writing
 from fractalcontact.scenes._tables import MAP_DIMS, groups_of, heading
 

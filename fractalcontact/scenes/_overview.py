@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.random_effects import random_effects
-from fractalcontact.base.robust import is_far
+from fractalcontact.base.regression import is_far, random_effects
 from fractalcontact.base.study import MEMBER, group_of
 from fractalcontact.scenes import _joint_rows
 from fractalcontact.scenes._result_tables import (

@@ -23,7 +23,7 @@ from fractalcontact.base import provenance
 from fractalcontact.base.errors import SmallStrainWarning
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
-from fractalcontact.base.references import provenance_of
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import parameters_of, public_function
 from fractalcontact.scenes._inputs import read_surface

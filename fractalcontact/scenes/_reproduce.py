@@ -13,10 +13,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance
-from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
+from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.netcdf import as_dataset
-from fractalcontact.base.references import provenance_of
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._parts import concatenate

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance, schema
-from fractalcontact.base.references import joined_references, provenance_of
+from fractalcontact.base.study import joined_references, provenance_of
 from fractalcontact.scenes._overview import main_results
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._study import StudyResults

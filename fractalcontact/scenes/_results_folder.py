@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
-from fractalcontact.base.netcdf_header import read_headers
-from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, WHERE, output_folder
-from fractalcontact.base.references import scene_of
+from fractalcontact.base.file_contents import read_headers
+from fractalcontact.base.files import PARTIAL_RESULT, RESULT, WHERE, output_folder
 from fractalcontact.base.signals import Stopped
+from fractalcontact.base.study import scene_of
 from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes._checkpoint import FOLDER
 from fractalcontact.scenes._scene import Scene

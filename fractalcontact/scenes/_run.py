@@ -19,11 +19,10 @@ import xarray as xr
 
 from fractalcontact.base import netcdf, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.base.output_folder import PARTIAL_RESULT, RESULT, locked
+from fractalcontact.base.files import PARTIAL_RESULT, RESULT, locked, written_whole
 from fractalcontact.base.process import calls_in_two_processes
-from fractalcontact.base.references import provenance_of
-from fractalcontact.base.study import of_member
-from fractalcontact.base.threads import DRAWING_LOCK, most_workers
+from fractalcontact.base.resources import DRAWING_LOCK, most_workers
+from fractalcontact.base.study import of_member, provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
 from fractalcontact.scenes._caveats import caveats
@@ -166,7 +165,7 @@ def _run_scans(
             together.add(tree)
         with _beside_the_result():
             frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
-            with netcdf.written_whole(folder / _results_folder.CSV) as temporary:
+            with written_whole(folder / _results_folder.CSV) as temporary:
                 frame.to_csv(temporary, index=False)
             is_drawn = scene.want.figures and studies.numbers
             figures = _draw(pictured(tree), folder, progress) if is_drawn else []
@@ -288,7 +287,7 @@ def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
     from fractalcontact import plotting
 
     first, page = of_member(tree, 0), Figure()
-    with DRAWING_LOCK, netcdf.written_whole(target) as temporary:
+    with DRAWING_LOCK, written_whole(target) as temporary:
         plotting.datasheet(first, notes=caveats(first), figure=page)
         page.savefig(
             temporary, format="pdf", metadata={"CreationDate": None, "Creator": _results_folder.SOFTWARE}

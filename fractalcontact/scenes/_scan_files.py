@@ -8,7 +8,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.file_patterns import files_of, is_pattern
+from fractalcontact.base.files import files_of, is_pattern
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.scenes._overview import folder_of
 from fractalcontact.scenes._scene import Scene

@@ -15,13 +15,13 @@ import xarray as xr
 
 from fractalcontact.base import signals
 from fractalcontact.base.errors import FractalContactError
+from fractalcontact.base.file_contents import read_headers
+from fractalcontact.base.files import RESULT
 from fractalcontact.base.netcdf import GrowingFile, groups_over
 from fractalcontact.base.netcdf import open as open_result
-from fractalcontact.base.netcdf_header import read_headers
-from fractalcontact.base.output_folder import RESULT
-from fractalcontact.base.progress import track
-from fractalcontact.base.references import provenance_of
 from fractalcontact.base.schema import label
+from fractalcontact.base.signals import track
+from fractalcontact.base.study import provenance_of
 from fractalcontact.scenes._checkpoint import PartStore, digest_of
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._overview import OVERVIEW, SCANS, folder_of

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
+from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.units import pascals
 from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
 from fractalcontact.scenes import _scene_keys

@@ -8,8 +8,7 @@ from typing import Any
 
 from fractalcontact.base.compass import AZIMUTHS, LARGEST_AZIMUTH
 from fractalcontact.base.compass import WORDS as AZIMUTH_WORDS
-from fractalcontact.base.lengths import UNITS
-from fractalcontact.base.units import PRESSURE
+from fractalcontact.base.units import PRESSURE, UNITS
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._functions import arguments_of
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, Table

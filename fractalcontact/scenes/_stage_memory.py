@@ -1,7 +1,7 @@
 """The peak memory of each stage of a study, estimated before it runs.
 
 At its peak a stage holds the libraries loaded so far, the surfaces, the maps that earlier stages keep, and
-what the call of its public function takes (see `base.memory`).
+what the call of its public function takes (see `base.resources`).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.memory import Plane, bytes_on, map_bytes, require_memory
+from fractalcontact.base.resources import Plane, bytes_on, map_bytes, require_memory
 from fractalcontact.scenes._functions import arguments_of, public_function
 from fractalcontact.scenes._inputs import block_shape, generator_options, surface_grid
 from fractalcontact.scenes._options import call_options

@@ -16,7 +16,7 @@ import xarray as xr
 
 from fractalcontact.base import signals
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.progress import track
+from fractalcontact.base.signals import track
 from fractalcontact.base.study import MEMBER
 from fractalcontact.scenes import _parts
 from fractalcontact.scenes._checkpoint import PartStore, digest

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.file_contents import remarks
-from fractalcontact.base.references import provenance_of
-from fractalcontact.base.study import MEMBER, group_of
+from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._result_tables import Column, length, plain, rows
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
-from fractalcontact.base.file_patterns import files_of, is_pattern
-from fractalcontact.base.references import provenance_of
+from fractalcontact.base.files import files_of, is_pattern
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._scene import OF_SURFACE

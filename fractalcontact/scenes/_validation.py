@@ -18,8 +18,8 @@ import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput, TooLittleMemory
 from fractalcontact.base.grid import plane_coords
-from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import real_numbers
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.schema import label
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems, Words

@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.memory import has_blocks
+from fractalcontact.base.labelled import check_leading
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import RANK, scaled_slopes, shifted
+from fractalcontact.base.regression import RANK, scaled_slopes, shifted
+from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_stack import check_stack, labelled_rows

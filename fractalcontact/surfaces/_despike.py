@@ -7,7 +7,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.regression import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces._height_stack import with_heights

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import Array
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems

@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
-from fractalcontact.base.memory import require_unpacked, unpacked_limit
 from fractalcontact.base.numbers import Array
+from fractalcontact.base.resources import require_unpacked, unpacked_limit
 
 WHERE = "fractalcontact.surfaces.read"
 RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import shifted
+from fractalcontact.base.regression import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_stack import check_stack, height_stack, with_heights

@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import Array, as_array
-from fractalcontact.base.references import provenance_of
 from fractalcontact.base.results import public_result
+from fractalcontact.base.study import provenance_of
+from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems
 
 PLANES = ("fit", "xy")

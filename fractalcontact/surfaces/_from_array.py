@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.lengths import UNITS, in_metres
 from fractalcontact.base.numbers import as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import GIVEN, Problems
 from fractalcontact.surfaces._new_surface import axis_spacing, check_memory, check_spacing, surface_array
 

@@ -12,9 +12,9 @@ import xarray as xr
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import DECADES
 from fractalcontact.base.jit import kernel
-from fractalcontact.base.lengths import UNITS
 from fractalcontact.base.numbers import Array, as_array
 from fractalcontact.base.results import public_result
+from fractalcontact.base.units import UNITS
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _fit_plane
 from fractalcontact.surfaces._new_surface import check_length

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import drop_unknown_coords, leading_coords
 from fractalcontact.base.grid import core_dims
+from fractalcontact.base.labelled import drop_unknown_coords, leading_coords
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.validation import Problems
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
-from fractalcontact.base.lengths import UNITS, in_metres
-from fractalcontact.base.netcdf_lock import NETCDF_LOCK
+from fractalcontact.base.files import NETCDF_LOCK
 from fractalcontact.base.numbers import Array, is_real
+from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import FileContent, Request

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.polynomial import detrended
+from fractalcontact.base.regression import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._height_stack import check_stack, height_stack, with_heights

@@ -11,8 +11,8 @@ import xarray as xr
 
 from fractalcontact.base import rng as streams
 from fractalcontact.base.grid import DECADES, plane_coords
-from fractalcontact.base.memory import require_memory
 from fractalcontact.base.numbers import Array, float_array, is_real, number_of_axes
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.validation import GIVEN, Problems
 
 SHORTEST, LONGEST = 10.0**-DECADES, 10.0**DECADES  # m

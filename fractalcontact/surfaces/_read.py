@@ -15,13 +15,13 @@ import xarray as xr
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile, warn
 from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
-from fractalcontact.base.lengths import UNITS, in_metres
+from fractalcontact.base.labelled import usual_form
 from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.provenance import file_checksum
-from fractalcontact.base.references import provenance_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.surface_argument import usual_form
+from fractalcontact.base.study import provenance_of
+from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems, reading
 from fractalcontact.surfaces import _files, _read_points
 from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request

@@ -16,11 +16,11 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import MissingExtra, UnreadableFile
-from fractalcontact.base.lengths import UNITS, in_metres
-from fractalcontact.base.memory import require_unpacked, unpacked_limit
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.provenance import file_checksum
+from fractalcontact.base.resources import require_unpacked, unpacked_limit
 from fractalcontact.base.results import public_result
+from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import Problems, reading
 from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import NotATable, Table

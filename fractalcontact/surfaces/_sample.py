@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.coords import check_leading
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.labelled import check_leading
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.polynomial import shifted
+from fractalcontact.base.regression import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import lagged_products
 from fractalcontact.base.validation import Problems

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.fft
 
-from fractalcontact.base import fft, threads
+from fractalcontact.base import fft, resources
 
 needs_ducc0 = pytest.mark.skipif(importlib.util.find_spec("ducc0") is None, reason="needs ducc0")
 
@@ -70,10 +70,10 @@ def test_split_plane_equals_whole_plane(shape, dtype, monkeypatch):
     """It fails where ducc0 groups lines differently on some processor."""
     monkeypatch.setenv("FRACTALCONTACT_FFT", "ducc0")
     plane = np.random.default_rng(3).standard_normal(shape).astype(dtype)
-    with threads.limit(1):
+    with resources.limit(1):
         reference = fft.rfft2(plane)
     for count in (2, 5, 16, 60):
-        with threads.limit(count):
+        with resources.limit(count):
             np.testing.assert_array_equal(fft.rfft2(plane), reference)
     np.testing.assert_allclose(reference, np.fft.rfft2(plane), rtol=0, atol=1e4 * np.finfo(dtype).eps)
 

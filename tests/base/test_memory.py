@@ -11,7 +11,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, TooLittleMemory
-from fractalcontact.base.memory import Plane, bytes_on, free_memory, require_memory
+from fractalcontact.base.resources import Plane, bytes_on, free_memory, require_memory
 from fractalcontact.base.results import public_result
 
 MIB = 1 << 20

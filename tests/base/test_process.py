@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from fractalcontact.base.process import calls_in_two_processes, peak_memory
 
 
@@ -67,7 +67,7 @@ def note(tmp_path, monkeypatch):
 
 def alone():
     """Whether no thread keeps this process from being copied; that of a progress bar does not."""
-    others = [each for each in threading.enumerate() if each.name != threads.NAME]
+    others = [each for each in threading.enumerate() if each.name != resources.NAME]
     others = [each for each in others if type(each).__name__ != "TMonitor"]
     return sys.platform == "linux" and others == [threading.main_thread()]
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 
 
 @pytest.fixture
 def eight_processors(monkeypatch):
     """Pretend that 8 processors are available and no variable is set; return `monkeypatch`."""
-    for name in ("FRACTALCONTACT_THREADS", *threads.LIMITS):
+    for name in ("FRACTALCONTACT_THREADS", *resources.LIMITS):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(8)), raising=False)
     return monkeypatch
@@ -22,10 +22,10 @@ def eight_processors(monkeypatch):
 
 def test_limit_ends_with_its_block(monkeypatch):
     monkeypatch.setenv("FRACTALCONTACT_THREADS", "3")
-    assert threads.thread_count() == 3
-    with threads.limit(1):
-        assert threads.thread_count() == 1
-    assert threads.thread_count() == 3
+    assert resources.thread_count() == 3
+    with resources.limit(1):
+        assert resources.thread_count() == 1
+    assert resources.thread_count() == 3
 
 
 @pytest.mark.parametrize(
@@ -46,14 +46,14 @@ def test_limit_ends_with_its_block(monkeypatch):
 def test_environment_sets_the_thread_count(eight_processors, environment, count):
     for name, word in environment.items():
         eight_processors.setenv(name, word)
-    assert threads.thread_count() == count
-    with threads.limit(7):
-        assert threads.thread_count() == 7
+    assert resources.thread_count() == count
+    with resources.limit(7):
+        assert resources.thread_count() == 7
 
 
 def test_limits_of_other_libraries_change_no_bit(eight_processors):
     surface = fc.surfaces.spectral((150, 140), 1e-4, hurst=0.7, rms_height=1e-6, rng=1)
-    for name in threads.LIMITS:
+    for name in resources.LIMITS:
         eight_processors.setenv(name, "1")
         limited = fc.surfaces.spectral((150, 140), 1e-4, hurst=0.7, rms_height=1e-6, rng=1)
         np.testing.assert_array_equal(limited.values, surface.values)
@@ -68,8 +68,8 @@ def test_error_of_a_band_is_raised_after_all_bands_ended():
             raise ZeroDivisionError(f"{start} to {stop}")
         ended.append(stop)
 
-    with threads.limit(2), pytest.raises(ZeroDivisionError, match="2 to 4"):
-        threads.in_bands(work, 4, 4 * threads.SHARE)
+    with resources.limit(2), pytest.raises(ZeroDivisionError, match="2 to 4"):
+        resources.in_bands(work, 4, 4 * resources.SHARE)
     assert ended == [2]
 
 
@@ -89,14 +89,14 @@ def test_bands_run_where_threads_cannot_be_started(monkeypatch, available):
         numbers.extend(range(first, last))
 
     count = 6 + available  # a number of threads that no other test has
-    with monkeypatch.context() as patch, threads.limit(count):
+    with monkeypatch.context() as patch, resources.limit(count):
         patch.setattr(threading.Thread, "start", limited)
-        threads.in_bands(work, 40, 40 * threads.SHARE)
+        resources.in_bands(work, 40, 40 * resources.SHARE)
         assert sorted(numbers) == list(range(40))
         assert threading.active_count() == before + available
     numbers.clear()
-    with threads.limit(count):
-        _call_within(20, threads.in_bands, work, 40, 40 * threads.SHARE)
+    with resources.limit(count):
+        _call_within(20, resources.in_bands, work, 40, 40 * resources.SHARE)
     assert sorted(numbers) == list(range(40))
     assert threading.active_count() > before
 

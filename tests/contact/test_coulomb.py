@@ -18,7 +18,7 @@ from slip_cases import (
 )
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.contact import _tangential_operator
 from fractalcontact.contact._scaled_problem import Body
@@ -285,7 +285,7 @@ def test_full_does_not_depend_on_threads():
     surface = rough(256)
     results = []
     for count in (1, 2):
-        with threads.limit(count):
+        with resources.limit(count):
             results.append(sheared(surface, [3.0, 1.0], normal_force=20.0, method="full"))
     for name in (*ALL, "tangential_displacement", "tangential_stiffness", "dissipated_energy"):
         np.testing.assert_array_equal(results[0][name], results[1][name])

@@ -5,7 +5,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.threads import limit
+from fractalcontact.base.resources import limit
 
 MODULUS = 1e9
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import fft, threads
-from fractalcontact.base.threads import limit
+from fractalcontact.base import fft, resources
+from fractalcontact.base.resources import limit
 from fractalcontact.contact import _window_solver
 from fractalcontact.contact._constrained_cg import ConstrainedCG
 
@@ -58,7 +58,7 @@ COMBINED = itertools.product(LIBRARIES, (True, False), BOUNDARIES, CONTROLS)
 )
 def test_bits_independent_of_units_and_threads(library, monkeypatch, single, boundary, control):
     monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0 if single else 10**9)
-    monkeypatch.setattr(threads, "SHARE", 1000)  # so that small passes are shared among threads too
+    monkeypatch.setattr(resources, "SHARE", 1000)  # so that small passes are shared among threads too
     monkeypatch.setattr(fft, "SMALL", 1000)
     surface, keep = rough(64), ("state", "pressure", "gap", "displacement")
     force = control != "closure"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from fractalcontact.base.errors import ConvergenceWarning
 
 MODULUS = 2e9
@@ -39,7 +39,7 @@ def test_no_bit_depends_on_the_number_of_threads(surfaces):
     given = {"contact_modulus": MODULUS, "nominal_pressure": [1e6, 1e7], "keep": ("pressure",)}
     results = []
     for count in (1, 3):
-        with threads.limit(count):
+        with resources.limit(count):
             results.append(fc.contact.press(surfaces, **given))
     check_equal(*results)
 

@@ -12,7 +12,7 @@ from contact.cases import displacement_under, draw, judge
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.threads import limit
+from fractalcontact.base.resources import limit
 
 pytestmark = pytest.mark.filterwarnings("ignore::fractalcontact.base.errors.ConvergenceWarning")
 ROUNDED = 1  # stop_reason: the tolerance is beyond what rounding leaves

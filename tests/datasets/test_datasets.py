@@ -10,8 +10,8 @@ import pytest
 from scipy import ndimage
 
 import fractalcontact as fc
-from fractalcontact.base.datasets import datasets_folder
 from fractalcontact.base.errors import UnreadableFile
+from fractalcontact.base.files import datasets_folder
 
 
 def script(name):

@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.references import provenance_of
 from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.study import provenance_of
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.references import provenance_of
+from fractalcontact.base.study import provenance_of
 
 VARIABLES = {
     "hurst", "fractal_dimension", "fitted_hurst", "standard_error", "ci_low", "ci_high", "scale_min",
@@ -190,7 +190,7 @@ def test_far_from_zero():
 def test_threads_change_no_bit(rough):
     result = []
     for count in (1, 2):
-        with threads.limit(count):
+        with resources.limit(count):
             result.append(
                 estimate(with_gaps(rough), [name for name in NAMES if name != "spectrum"]).drop_vars(
                     "run_time"

@@ -7,7 +7,7 @@ from scipy.ndimage import gaussian_filter
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.base.random_effects import random_effects
+from fractalcontact.base.regression import random_effects
 
 # values with errors that differ a lot: Paule-Mandel tau^2 and mean solve the two equations of the method
 VALUES = np.array([-0.8893, -1.5854, -1.3481, -1.4416, -0.2175, -0.7861, 0.0120])

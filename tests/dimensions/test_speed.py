@@ -7,7 +7,7 @@ import pytest
 import scipy.fft
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 
 pytestmark = pytest.mark.benchmark
 
@@ -29,7 +29,7 @@ def surface():
 
 def test_closed_form_within_one_transform(surface):
     """A real transform of the surface takes about 10 ms on one core of 2020."""
-    with threads.limit(1):
+    with resources.limit(1):
         closed = fastest(lambda: fc.dimensions.estimate(surface, "increments"))
         transform = fastest(lambda: scipy.fft.rfft2(surface.values, workers=1))
     assert closed < 1.5 * transform
@@ -37,14 +37,14 @@ def test_closed_form_within_one_transform(surface):
 
 
 def test_likelihood_within_100_transforms(surface):
-    with threads.limit(1):
+    with resources.limit(1):
         complete = fastest(lambda: fc.dimensions.estimate(surface), rounds=3)
         transform = fastest(lambda: scipy.fft.rfft2(surface.values, workers=1))
     assert complete < 100 * transform
 
 
 def test_closed_form_is_linear_in_points(surface):
-    with threads.limit(1):
+    with resources.limit(1):
         small = fastest(lambda: fc.dimensions.estimate(surface[:512, :512], "increments"))
         large = fastest(lambda: fc.dimensions.estimate(surface, "increments"))
     assert large < 8 * small
@@ -55,7 +55,7 @@ def test_block_gap_within_twice_the_complete_surface(surface):
     complete = surface[:512, :512]
     gapped = complete.copy(deep=True)
     gapped[128:192, 170:234] = np.nan
-    with threads.limit(1):
+    with resources.limit(1):
         for part in (complete, gapped):
             fc.dimensions.estimate(part)
         pairs = [

@@ -322,7 +322,7 @@ def test_unit_of_length_changes_only_box_length():
 
 
 def test_result_is_independent_of_the_number_of_threads():
-    from fractalcontact.base.threads import limit
+    from fractalcontact.base.resources import limit
 
     planes = np.array([level_set(64, 0.5, c, np.random.default_rng(10)) for c in (0.1, 0.4)])
     results = []

@@ -8,7 +8,7 @@ import scipy.fft
 from domains.sets import as_mask, random_null
 
 import fractalcontact as fc
-from fractalcontact.base.threads import limit
+from fractalcontact.base.resources import limit
 
 pytestmark = pytest.mark.benchmark
 N = 2048

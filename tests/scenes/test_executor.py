@@ -20,7 +20,7 @@ from study import SOUND, watch_calls
 
 import fractalcontact as fc
 from fractalcontact import cli
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.signals import Stopped
 
@@ -92,7 +92,7 @@ def test_lost_worker_is_reported_and_nothing_else_is_lost(uninterrupted, tmp_pat
 
 def test_a_worker_uses_one_thread_unless_the_environment_sets_more(uninterrupted, monkeypatch):
     counts = []
-    watch_calls(monkeypatch, lambda name: counts.append(threads.thread_count()))
+    watch_calls(monkeypatch, lambda name: counts.append(resources.thread_count()))
     monkeypatch.delenv("FRACTALCONTACT_THREADS", raising=False)
     fc.scenes.run(uninterrupted[0], progress=False, client=Remote())
     assert set(counts) == {1}
@@ -218,13 +218,13 @@ SLOW_START = """
 import os, sys, time, types
 sys.path.insert(0, sys.argv[3])
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from study import watch_calls
 
 copies, counts = [], []
 
 def note(name):
-    counts.append(threads.thread_count())
+    counts.append(resources.thread_count())
     time.sleep(0.6 if len(counts) == 1 else 0)
 
 os.register_at_fork(before=lambda: copies.append(1))

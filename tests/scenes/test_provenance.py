@@ -9,8 +9,8 @@ from study import watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput
-from fractalcontact.base.references import provenance_of
 from fractalcontact.base.signals import Stopped
+from fractalcontact.base.study import provenance_of
 
 STUDY = """
 [surface]

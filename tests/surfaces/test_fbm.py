@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 from fractalcontact.base.errors import InvalidInput
 
 
@@ -87,7 +87,7 @@ def test_thread_count_changes_no_bit(monkeypatch, library):
     monkeypatch.setenv("FRACTALCONTACT_FFT", library)
     surfaces = []
     for count in (1, 2, 3):
-        with threads.limit(count):
+        with resources.limit(count):
             surfaces.append(fbm((150, 140)).values)
     np.testing.assert_array_equal(surfaces[0], surfaces[1])
     np.testing.assert_array_equal(surfaces[0], surfaces[2])

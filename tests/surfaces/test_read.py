@@ -13,7 +13,7 @@ import scipy.io
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base import memory
+from fractalcontact.base import resources
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 
 HEIGHTS = np.arange(12.0).reshape(3, 4) * 1e-6
@@ -133,7 +133,7 @@ def test_file_that_fills_the_memory_is_refused(tmp_path, monkeypatch, name):
     path = packed(tmp_path / name)
     if name == "a.npy.gz":
         assert fc.surfaces.read(path, spacing=1e-5).shape == (2000, 2500)
-    monkeypatch.setattr(memory, "SMALL_FILE", 1 << 20)
+    monkeypatch.setattr(resources, "SMALL_FILE", 1 << 20)
     with pytest.raises(UnreadableFile, match=r"expected at most \d+ MiB when unpacked") as caught:
         fc.surfaces.read(path, spacing=1e-5)
     assert str(caught.value).count("problem") == 1

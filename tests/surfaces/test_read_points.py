@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import memory
+from fractalcontact.base import resources
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile
 
 NX, NY, STEP = 12, 9, 0.5
@@ -259,7 +259,7 @@ def test_second_file_in_the_plane_of_the_first(tmp_path):
 
 
 def test_gzip_that_unpacks_without_bound_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(memory, "SMALL_FILE", 1 << 20)
+    monkeypatch.setattr(resources, "SMALL_FILE", 1 << 20)
     (tmp_path / "a.xyz.gz").write_bytes(gzip.compress(bytes(1 << 26)))
     with pytest.raises(UnreadableFile, match="MiB when unpacked"):
         fc.surfaces.read(tmp_path / "a.xyz.gz")

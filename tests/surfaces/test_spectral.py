@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base import spectra, threads
+from fractalcontact.base import resources, spectra
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.surfaces import SelfAffine
 
@@ -217,7 +217,7 @@ def test_units_by_powers_of_two_change_no_bit():
 def test_thread_count_changes_no_bit():
     surfaces = []
     for count in (1, 2, 3):
-        with threads.limit(count):
+        with resources.limit(count):
             surfaces.append(spectral((150, 140)).values)
     np.testing.assert_array_equal(surfaces[0], surfaces[1])
     np.testing.assert_array_equal(surfaces[0], surfaces[2])

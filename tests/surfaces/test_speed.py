@@ -9,7 +9,7 @@ import pytest
 import scipy.fft
 
 import fractalcontact as fc
-from fractalcontact.base import threads
+from fractalcontact.base import resources
 
 pytestmark = pytest.mark.benchmark
 
@@ -29,7 +29,7 @@ def ratio(make, parts, rounds=9):
 @pytest.fixture(autouse=True)
 def one_scipy_thread(monkeypatch):
     monkeypatch.setenv("FRACTALCONTACT_FFT", "scipy")
-    with threads.limit(1):
+    with resources.limit(1):
         yield
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 import fractalcontact as fc
 from fractalcontact.base.process import peak_memory
-from fractalcontact.base.threads import thread_count
+from fractalcontact.base.resources import thread_count
 
 PRESSURE, TOLERANCE = 0.01, 1e-6
 
