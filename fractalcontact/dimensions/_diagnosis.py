@@ -34,6 +34,16 @@ def diagnose(surface: Surface) -> str:
     """Return why no interval holds for a surface, and what to do; empty where nothing was found."""
     if surface.finest_scale:
         return ""
+    return (
+        resampling(surface)
+        or _seams(surface.heights, rounding_step(surface))
+        or _spikes(surface.heights)
+        or _missing_extremes(surface.heights)
+    )
+
+
+def resampling(surface: Surface) -> str:
+    """Return that points were interpolated or repeated; empty where they were not."""
     if surface.linear_share > _LINEAR:
         return (
             "many heights lie exactly on lines between their neighbours: they were interpolated; "
@@ -46,11 +56,7 @@ def diagnose(surface: Surface) -> str:
             "repeated ones, or give "
             "`scales` from eight blocks on"
         )
-    return (
-        _seams(surface.heights, rounding_step(surface))
-        or _spikes(surface.heights)
-        or _missing_extremes(surface.heights)
-    )
+    return ""
 
 
 def rounding_step(surface: Surface, *, rows: int = 16, sample: int = 4096) -> float:

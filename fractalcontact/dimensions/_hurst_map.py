@@ -1,35 +1,75 @@
-"""Map of the Hurst exponent: the closed-form estimate in windows that move over the surface."""
+"""Map of the Hurst exponent: windows that move over a surface share the blur and the noise of its model.
+
+The model is that of `likelihood`. All windows have modes and bins alike, so that one table holds the expected
+powers of all of them.
+
+1. The logarithms of the bins are averaged over the windows. Where the exponent differs from place to place
+   their mean has the mean exponent: logarithms of powers are nearly linear in H. The posterior of this mean
+   gives the blur, the noise and the bend, with their probabilities.
+2. At each combination of them amplitude and exponent of each window are fitted to its difference from the
+   mean: what the model does not hold is alike in all windows, and drops out.
+3. The variance of the exponent of a window is that of its own modes plus that of the mean due to the
+   nuisances. The first is multiplied by chi square per degree of freedom where that is above one, as the
+   Particle Data Group does; windows count in the mean by the inverse of it.
+"""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base import fft
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._increments import increments
-from fractalcontact.dimensions._records import Estimate, undefined
+from fractalcontact.dimensions._diagnosis import resampling, rounding_step
+from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
+from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, ModeFit, fitted_modes
+from fractalcontact.dimensions._mode_bins import (
+    LEAST,
+    LEAST_BINS,
+    bin_numbers,
+    clear_modes,
+    expected_power,
+    fill,
+    gaussian_surfaces,
+    make_bins,
+)
+from fractalcontact.dimensions._records import CONSTANT, NORMAL, Estimate, plane, smooth, undefined
+from fractalcontact.dimensions._spectral_posterior import (
+    HIGHEST,
+    HURST,
+    LOWEST,
+    NOISE,
+    SPREAD,
+    Posterior,
+    bin_power,
+    posterior,
+)
 from fractalcontact.dimensions._surface_input import (
     Scales,
+    Surface,
+    between,
     check_scales,
     check_surface,
     read_scales,
     read_surfaces,
 )
-from fractalcontact.dimensions._waves import without_waves
+from fractalcontact.dimensions._waves import LARGEST_CROP, without_waves
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along the edge of a window
 FEWEST = 25  # observed points in a window
-_ALIKE = 2.0  # mean square of the deviations of windows over their errors: 1 where one exponent holds
-_BENT = 2.6  # |z| of the bend of all windows together: one exact surface in a hundred
 _FIELDS = ("hurst", "standard_error", "ci_low", "ci_high")
+# u of the exponents between which the logarithms of powers are linear, to .1 %
+_EXPONENTS = np.linspace(-3.0, 3.0, 61)
 
 
 def _check(problems: Problems) -> None:
@@ -66,14 +106,13 @@ def hurst_map(
     step : float, optional
         Distance between neighbouring windows in m; by default half a window.
     scales : (low, high), optional
-        Lags in m between which to fit, as (4, 16) spacings for a blurred surface. Default: the shortest.
+        Wavelengths in m of the waves that are fitted, as they are. Default: all that one model describes.
 
     Returns
     -------
     Dataset over the leading dims and (y, x), the centres of the windows in m
-        `hurst`, `standard_error`, `ci_low`, `ci_high` of the method "increments" of `estimate`, and
-        `fractal_dimension`. NaN where fewer than 25 points of a window were observed, or where heights do
-        not vary.
+        `hurst`, `standard_error`, `ci_low`, `ci_high` and `fractal_dimension`. NaN where fewer than 25 points
+        of a window were observed, or where heights do not vary.
 
     Raises
     ------
@@ -82,8 +121,10 @@ def hurst_map(
 
     Notes
     -----
-    Windows that overlap have correlated errors: compare those at least one window apart. Where the windows
-    together have a bent power law, as with blur or noise, there is no interval, and `reason` says so.
+    Windows that overlap have correlated errors: compare those at least one window apart. Blur, noise and bend
+    of the spectrum are those of the model of `estimate`, the same in all windows; single waves are taken out
+    first, but of dask arrays. The interval of a window whose spectrum differs from the others by more than
+    its exponent is wider. Theory: page `theory_dimensions`.
 
     Examples
     --------
@@ -93,7 +134,7 @@ def hurst_map(
     >>> dict(result.hurst.sizes), round(float(result.hurst.mean()), 1)
     ({'y': 5, 'x': 7}, 0.7)
     """
-    grid, lags = read_grid(surface), read_scales(scales)
+    grid, wavelengths = read_grid(surface), read_scales(scales)
     edges = [max(SMALLEST, round(window / spacing)) for spacing in grid.spacing]
     edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
     length = 0.5 * window if step is None else min(float(step), max(grid.extent))
@@ -101,25 +142,23 @@ def hurst_map(
     rows, columns = (
         np.arange(0, n - edge + 1, jump) for n, edge, jump in zip(grid.shape, edges, steps, strict=True)
     )
+    windows = _Windows((edges[0], edges[1]), rows, columns, steps)
     leading = surface.dims[:-2]
-    new = float(np.prod([min(1.0, jump / edge) for jump, edge in zip(steps, edges, strict=True)]))
     records: list[Estimate] = []
     notes: list[str] = []
-    for plane in range(int(np.prod(surface.shape[:-2], dtype=int))):
-        index = np.unravel_index(plane, surface.shape[:-2])
+    for plane_number in range(int(np.prod(surface.shape[:-2], dtype=int))):
+        index = np.unravel_index(plane_number, surface.shape[:-2])
         single = surface.isel(dict(zip(leading, map(int, index), strict=True)))
+        reason = ""
         if not has_blocks(single):
-            without, found = without_waves(read_surfaces(single)[0])
+            read = read_surfaces(single)[0]
+            reason = "" if read.finest_scale or scales is not None else resampling(read)
+            without, found = without_waves(read)
             if found:
                 heights = (without.heights * without.unit).reshape(single.shape)
                 single, notes = single.copy(data=heights), [*notes, found]
-        of_plane = []
-        for row in rows:
-            band = single.isel(y=slice(int(row), int(row) + edges[0])).compute()
-            parts = (band.isel(x=slice(int(start), int(start) + edges[1])) for start in columns)
-            of_plane += [_estimated(part, lags) for part in parts]
-        whole = 0.0 if has_blocks(single) else increments(read_surfaces(single)[0], lags, None).misfit
-        records += _without_bent(of_plane, new, whole if np.isfinite(whole) else 0.0)
+        of_plane = _estimates(single, windows, wavelengths)
+        records += [record.without_interval(reason) for record in of_plane] if reason else of_plane
     reasons = "; ".join(dict.fromkeys(record.reason for record in records if record.reason))
     shape = (*surface.shape[:-2], rows.size, columns.size)
     data: dict[str, Any] = {
@@ -141,34 +180,306 @@ def hurst_map(
     return result
 
 
-def _without_bent(records: list[Estimate], new: float, whole: float) -> list[Estimate]:
-    """Return the estimates of a surface, without intervals where the power laws of its windows are bent.
+@dataclass(frozen=True)
+class _Windows:
+    """Edges of the windows in points, their first rows and columns, and the steps between them."""
 
-    An exponent that differs from place to place bends no power law inside a window. `new` is the share of a
-    window that the one before does not have; `whole` is the bend of the whole surface.
+    edges: tuple[int, int]
+    rows: Array
+    columns: Array
+    steps: list[int]
+
+    @property
+    def number(self) -> int:
+        return int(self.rows.size * self.columns.size)
+
+    @property
+    def new(self) -> float:
+        """Share of a window that the one before does not have."""
+        return math.prod(min(1.0, s / edge) for s, edge in zip(self.steps, self.edges, strict=True))
+
+
+def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list[Estimate]:
+    """Return the estimates of the windows of one surface, row by row."""
+    middle = _middle(surface)
+    is_plane = middle is not None and middle.is_plane
+    if middle is not None:
+        scales = middle.resolved(scales)
+    fit = None if middle is None or middle.is_constant or is_plane else fitted_modes(middle)
+    model = None if fit is None or middle is None else _Model.of(fit, windows.edges, middle, scales)
+    rows = [_spectra(model, surface, int(row), windows) for row in windows.rows]
+    records = [record for row in rows for record in row[0]]
+    chosen = np.flatnonzero([record is None for record in records])
+    if model is None or chosen.size == 0:
+        others = undefined(NO_MODES) if fit is None or scales is not None else smooth()
+        return [record or (plane() if is_plane else others) for record in records]
+    mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
+    from scipy.special import digamma, polygamma
+
+    degrees = 0.5 * model.lattice.degrees * model.count * share
+    level = np.log(np.maximum(mean, 1e-300)) + np.log(degrees) - digamma(degrees)
+    quantiles = _quantiles(*model.components(level, polygamma(1, degrees), windows.new, scales is not None))
+    for place, (low, hurst, high) in zip(chosen, quantiles, strict=True):
+        record = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high)
+        wide = f"the heights of a window do not determine its exponent: {low:.2f} to {high:.2f} is as likely"
+        records[place] = record.without_interval(wide) if high - low > WIDEST else record
+    return [record or undefined(NO_MODES) for record in records]
+
+
+def _middle(surface: xr.DataArray) -> Surface | None:
+    """Return the middle of a surface, or all of one in memory where little of its middle was observed."""
+    cuts = {
+        d: slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for d, n in surface.sizes.items()
+    }
+    for part in (surface.isel(cuts).compute(), None if has_blocks(surface) else surface):
+        if part is not None and np.count_nonzero(np.isfinite(part.values)) >= FEWEST:
+            return read_surfaces(part)[0]
+    return None
+
+
+@dataclass(frozen=True)
+class _Model:
+    """Modes and bins of all windows, with their expected power.
+
+    Attributes
+    ----------
+    fit : ModeFit
+        Of the surface or its middle.
+    unit : float
+        Of heights, m.
+    background : float
+        See `hypotheses`.
+    lattice : Lattice
+        Of a window.
+    pilot : ndarray
+        Expected power of each mode.
+    order, starts, count : ndarray of int
+        Flat indices of the modes that count, bin after bin; the first of each bin, and their number.
+    bins : Bins
+    expected : ndarray
+        Mean of the expected powers of a bin.
     """
-    given = [record for record in records if np.isfinite(record.misfit) and record.standard_error > 0.0]
-    if not given:
-        return records
-    bends, exponents, errors = (
-        np.array([getattr(record, name) for record in given])
-        for name in ("misfit", "hurst", "standard_error")
-    )
-    z = float(bends.sum() * np.sqrt(new / bends.size))
-    scatter = np.mean(np.square((exponents - np.average(exponents, weights=errors**-2.0)) / errors))
-    if scatter < _ALIKE:  # then the whole surface has one exponent, whose bend many lags show
-        z = max(z, whole)
-    if abs(z) <= _BENT:
-        return records
-    reason = (
-        f"the exponent changes with the lag inside the windows ({z:+.1f} standard deviations), as with blur, "
-        "noise or marks: see `estimate`, and choose `scales` beyond them"
-    )
-    return [record if record.reason else record.without_interval(reason) for record in records]
+
+    fit: ModeFit
+    unit: float
+    background: float
+    lattice: Lattice
+    pilot: Array
+    order: Array
+    starts: Array
+    count: Array
+    bins: Bins
+    expected: Array
+
+    @classmethod
+    def of(cls, fit: ModeFit, edges: tuple[int, int], middle: Surface, scales: Scales) -> _Model | None:
+        """Prepare the windows of a surface; None where too few of their modes count."""
+        lattice = replace(fit.lattice, shape=edges, periodic=False)
+        pilot, clean = (expected_power(lattice, fit.theta, fit.form, edges=edge) for edge in (True, False))
+        sharp = fit.theta.copy()
+        sharp[SPREAD] = 0.0
+        keep = clear_modes(pilot, clean, expected_power(lattice, sharp, fit.form, edges=False))
+        keep &= between(2.0 * np.pi / lattice.q * middle.spacing[1], scales)
+        if np.count_nonzero(keep) < LEAST * LEAST_BINS:
+            return None
+        number = bin_numbers(lattice, keep).ravel()
+        order = np.argsort(number, kind="stable")[np.count_nonzero(number < 0) :]
+        count = np.bincount(number[order])
+        background = math.hypot(rounding_step(middle) / math.sqrt(12.0), float(np.finfo(float).eps))
+        return cls(
+            fit,
+            fit.scale * middle.unit,
+            background / fit.scale,
+            lattice,
+            pilot,
+            order,
+            np.cumsum(count) - count,
+            count,
+            make_bins(lattice, pilot, pilot, keep),
+            np.bincount(number[order], pilot.ravel()[order]) / count,
+        )
+
+    def means(self, heights: Array, columns: Array, at_once: int = 1 << 20) -> Array:
+        """Return the mean power over the pilot of the bins of windows in a row, shape (windows, bins).
+
+        `at_once`: points of windows that are transformed at a time.
+        """
+        ny, nx = self.lattice.shape
+        y, x = (np.arange(n) - 0.5 * (n - 1) for n in (ny, nx))
+        expected, means = self.pilot.ravel()[self.order], []
+        for some in np.array_split(columns, -(-columns.size * nx * ny // at_once)):
+            z = np.stack([heights[:, start : start + nx] for start in some])
+            z -= z.mean(axis=(1, 2), keepdims=True)
+            z -= (z.sum(axis=2) @ y / (nx * (y @ y)))[:, None, None] * y[:, None]
+            z -= (z.sum(axis=1) @ x / (ny * (x @ x)))[:, None, None] * x
+            modes = fft.dct(z, 2, (1, 2))[:, 1:, 1:].reshape(some.size, -1)[:, self.order]
+            power = np.square(modes) / (4.0 * nx * ny * expected)
+            means.append(np.add.reduceat(power, self.starts, axis=1) / self.count)
+        return np.concatenate(means)
+
+    def filled_means(self, heights: Array, columns: Array) -> tuple[Array, Array]:
+        """Return `means` of a row with gaps, filled and corrected for it, and the information of the modes.
+
+        Gaussian surfaces get the same gaps, as in `filling_ratio`.
+        """
+        observed = np.isfinite(heights)
+        band = replace(self.lattice, shape=heights.shape)
+        pilot = expected_power(band, self.fit.theta, self.fit.form)
+        before, after = (np.zeros((columns.size, self.count.size)) for _ in range(2))
+        for _, complete in gaussian_surfaces(band, pilot):
+            before += self.means(complete, columns)
+            after += self.means(fill(np.where(observed, complete, np.nan)), columns)
+        ratio = np.maximum(after / before, 1e-12)
+        shares = np.array([observed[:, start : start + self.lattice.shape[1]].mean() for start in columns])
+        information = np.square(shares)[:, None] * np.minimum(1.0, ratio)
+        return self.means(fill(heights), columns) / ratio, np.maximum(information, 1e-3)
+
+    def components(
+        self,
+        level: Array,
+        variance: Array,
+        new: float,
+        is_window: bool,
+        *,
+        probability: float = 0.99,
+        most: int = 64,
+    ) -> tuple[Array, Array, Array]:
+        """Return shares, and means and deviations of u of each window, for probable nuisances.
+
+        `level` and `variance` are those of the bins of each window, `new` the share of its points that a
+        window does not have in common with the one before. Those that together have the `probability` are
+        used, at most `most` of them.
+        """
+        known = 0.0 if is_window else None
+        mean, scatter = _mean_of_windows(level, variance, self.bins.lnq, max(new, 1.0 / len(level)))
+        bins = replace(self.bins, level=mean, variance=scatter)
+        spread = 0.0 if is_window else float(self.fit.theta[SPREAD])
+        found = posterior(
+            bins,
+            spread=known,
+            noise=known,
+            background=self.background,
+            pilot_spread=spread,
+            is_window=is_window,
+        )
+        order = np.argsort(-found.share.ravel())
+        shares = found.share.ravel()[order]
+        number = min(most, 1 + int(np.searchsorted(np.cumsum(shares), probability)))
+        weight = 1.0 / np.vstack([scatter, variance])
+        each = [_about_mean(bins, found, int(k), level, weight) for k in order[:number]]
+        centre, deviation = (np.stack(parts, axis=1) for parts in zip(*each, strict=True))
+        return shares[:number] / shares[:number].sum(), centre, deviation
 
 
-def _estimated(part: xr.DataArray, scales: Scales) -> Estimate:
-    """Return the estimate of one window."""
-    if np.count_nonzero(np.isfinite(part.values)) < FEWEST:
-        return undefined(f"fewer than {FEWEST} points were observed")
-    return increments(read_surfaces(part)[0], scales, False).limited()
+def _spectra(
+    model: _Model | None, surface: xr.DataArray, row: int, windows: _Windows
+) -> tuple[list[Estimate | None], Array, Array]:
+    """Return the records of windows without a fit in a row, the mean powers, and the information of modes."""
+    edge_y, edge_x = windows.edges
+    heights = surface.isel(y=slice(row, row + edge_y)).compute().values.astype(np.float64)
+    records: list[Estimate | None] = [None] * windows.columns.size
+    for k, start in enumerate(windows.columns):
+        part = heights[:, start : start + edge_x]
+        part = part[np.isfinite(part)]
+        if part.size < FEWEST:
+            records[k] = undefined(f"fewer than {FEWEST} points were observed")
+        elif part.min() == part.max():
+            records[k] = undefined(CONSTANT)
+    if model is None:
+        return records, np.zeros(0), np.zeros(0)
+    heights = heights / model.unit
+    if np.isfinite(heights).all():
+        mean = model.means(heights, windows.columns)
+        share = np.ones(mean.shape)
+    else:
+        mean, share = model.filled_means(heights, windows.columns)
+    rounding = np.square(4.0 * np.spacing(float(np.nanmax(np.abs(heights), initial=0.0))))
+    is_flat = (mean * model.expected) @ model.count < rounding * model.order.size
+    for k in np.flatnonzero(is_flat).tolist():
+        records[k] = records[k] or plane()
+    return records, mean, share
+
+
+def _mean_of_windows(
+    level: Array, variance: Array, lnq: Array, new: float, rounds: int = 4
+) -> tuple[Array, Array]:
+    """Return the mean levels of the bins and their variance; a window counts by its scatter about them.
+
+    Levels and slopes of the windows differ; the rest is chi square.
+    """
+    factor = np.ones((len(level), 1))
+    for _ in range(rounds):
+        weight = 1.0 / (factor * variance)
+        mean = (weight * level).sum(axis=0) / weight.sum(axis=0)
+        square = _fitted(level - mean, 1.0 / variance, np.broadcast_to(lnq, level.shape))[3]
+        factor = np.maximum(1.0, square / max(lnq.size - 2, 1))[:, None]
+    return mean, 1.0 / (new * (1.0 / (factor * variance)).sum(axis=0))
+
+
+def _about_mean(
+    bins: Bins, found: Posterior, component: int, level: Array, weight: Array, steps: int = 8
+) -> tuple[Array, Array]:
+    """Return mean and deviation of u of each window at the nuisances of one component of the posterior.
+
+    The first row of `weight` is that of the mean of the windows.
+    """
+    from scipy.special import ndtr
+
+    m, k = np.unravel_index(component, found.share.shape)
+    form, theta, discrepancy = found.hypotheses[m].form, found.theta[m, k].copy(), found.discrepancies[k]
+    problem = form, bins.axes, bins.tables[form], bins.nodes, bins.t, bins.white, bins.lnq
+    model, logs = np.empty(bins.level.size), np.empty((_EXPONENTS.size, bins.level.size))
+    bin_power(theta, *problem, model)
+    weight = weight * discrepancy.inside
+    amplitude = float(weight[0] @ (bins.level - model) / weight[0].sum())
+    noise = math.exp(amplitude) * theta[NOISE] ** 2 * bins.white
+    theta[NOISE] = 0.0
+    for row, u in zip(logs, _EXPONENTS, strict=True):
+        theta[HURST] = LOWEST + (HIGHEST - LOWEST) * float(ndtr(u))
+        bin_power(theta, *problem, row)
+    # the mean differs from the model alike in all windows
+    target = np.vstack([model + amplitude, level - bins.level + model + amplitude])
+    u, a = np.full(len(target), found.centre[m, k]), np.full(len(target), amplitude)
+    step, free = _EXPONENTS[1] - _EXPONENTS[0], max(int(discrepancy.inside.sum()) - 2, 1)
+    for _ in range(steps):  # Gauss-Newton
+        place = np.clip((u - _EXPONENTS[0]) / step, 0.0, _EXPONENTS.size - 1.001)
+        below = place.astype(int)
+        slope = (logs[below + 1] - logs[below]) / step
+        power = np.exp(a[:, None] + logs[below] + (place - below)[:, None] * step * slope)
+        total = power + noise
+        share = power / total  # of the surface, beside the noise
+        first, second, variance, square = _fitted(target - np.log(total), weight, share * slope, share)
+        a, u = a + np.clip(first, -1.0, 1.0), np.clip(u + np.clip(second, -0.7, 0.7), *_EXPONENTS[[0, -1]])
+    by_nuisances = max(found.scale[m, k] ** 2 - variance[0], 0.0)
+    own = variance[1:] * np.maximum(1.0, square[1:] / free)
+    return u[1:], np.sqrt(own + by_nuisances)
+
+
+def _fitted(
+    values: Array, weight: Array, column: Array, level: Array | float = 1.0
+) -> tuple[Array, Array, Array, Array]:
+    """Fit level and column to each row: coefficients, variance of the second one, chi square of the rest."""
+    level = np.broadcast_to(level, column.shape)
+    aa, ab, bb = (
+        (weight * p * q).sum(axis=1) for p, q in ((level, level), (level, column), (column, column))
+    )
+    a, b = ((weight * p * values).sum(axis=1) for p in (level, column))
+    determinant = np.maximum(aa * bb - ab * ab, 1e-300)
+    first, second = (bb * a - ab * b) / determinant, (aa * b - ab * a) / determinant
+    square = (weight * values * values).sum(axis=1) - first * a - second * b
+    return first, second, aa / determinant, square
+
+
+def _quantiles(shares: Array, centre: Array, deviation: Array) -> Array:
+    """Return quantiles of H, .025, .5 and .975, of sums of normal distributions of u: (windows, 3)."""
+    from scipy.special import ndtr
+
+    found = []
+    for share in (0.025, 0.5, 0.975):
+        low, high = np.full(len(centre), -8.0), np.full(len(centre), 8.0)
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            is_below = ndtr((middle[:, None] - centre) / deviation) @ shares < share
+            low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
+        found.append(LOWEST + (HIGHEST - LOWEST) * ndtr(low))
+    return np.stack(found, axis=1)

@@ -24,6 +24,7 @@ from fractalcontact.dimensions._diagnosis import diagnose, rounding_step, uneven
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
+    LEAST_BINS,
     TAPERED,
     clear_modes,
     expected_power,
@@ -57,15 +58,14 @@ _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free: the interval is for "
     "another kind of surface; see fractalcontact.surfaces.fill"
 )
-_NO_MODES = (
+NO_MODES = (
     "too few modes that vary along both axes: give more points, or a profile where heights vary along one"
 )
-_WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
+WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
 _SEEN = 0.8  # probability from which on a nuisance is named
 _NOISE_ROUNDS = 2  # of the amplitude, by which known noise is divided: it changes by less than 1 % in a third
 _EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
 _ROUNDS = 1  # corrections for a stretch and gaps; a second one moved no rms error by more than .0005
-_LEAST_BINS = 3  # an amplitude, an exponent, and one that can contradict them
 
 
 @dataclass(frozen=True)
@@ -120,21 +120,21 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     spread = None if psf is None else psf / surface.spacing[1]
     fit = fitted_modes(surface, spread)
     if fit is None:
-        return undefined(_NO_MODES)
+        return undefined(NO_MODES)
     keep = fit.keep
     if window is not None:
         wavelength = 2.0 * np.pi / fit.lattice.q * surface.spacing[1]
         keep = keep & (wavelength >= window[0] * (1.0 - 1e-9)) & (wavelength <= window[1] * (1.0 + 1e-9))
     number = int(np.count_nonzero(keep))
-    if number < LEAST * _LEAST_BINS and window is None and keep.size > 4 * LEAST * _LEAST_BINS:
+    if number < LEAST * LEAST_BINS and window is None and keep.size > 4 * LEAST * LEAST_BINS:
         return smooth()
-    if number < LEAST * _LEAST_BINS:
+    if number < LEAST * LEAST_BINS:
         what = (
             "in the window of scales"
             if window is not None
             else "that the edges of the surface do not dominate"
         )
-        return undefined(f"{number} modes {what}, at least {LEAST * _LEAST_BINS} are needed")
+        return undefined(f"{number} modes {what}, at least {LEAST * LEAST_BINS} are needed")
     unit = fit.scale * surface.unit
     background = math.hypot(rounding_step(surface) / math.sqrt(12.0), float(np.finfo(float).eps)) / fit.scale
     bins = fit.bins(keep)
@@ -194,7 +194,7 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
         ratio_of_lags = stretch(lattice, levels, unblurred)
         if is_complete and lattice.stretch == ratio_of_lags == 1.0:
             break
-        if not is_complete and np.count_nonzero(keep) >= LEAST * _LEAST_BINS:
+        if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
             bins = make_bins(lattice, power / level, pilot, keep, information=information)
             hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
             form = hypothesis.form
@@ -224,8 +224,8 @@ def _first_fit(
     pilot = torus.q ** (-1.0 - torus.axes)
     inside = power > _EMPTY * float(np.max(power / pilot)) * pilot
     keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)
-    if np.count_nonzero(keep) < LEAST * _LEAST_BINS:
-        keep = inside if np.count_nonzero(inside) >= LEAST * _LEAST_BINS else np.ones(keep.shape, dtype=bool)
+    if np.count_nonzero(keep) < LEAST * LEAST_BINS:
+        keep = inside if np.count_nonzero(inside) >= LEAST * LEAST_BINS else np.ones(keep.shape, dtype=bool)
     levels = levels_by_azimuth(torus, whitened(torus, power, pilot, keep), keep)
     torus = replace(torus, stretch=stretch(torus, levels, pilot, information=TAPERED))
     y, x = torus.wavenumbers
@@ -298,7 +298,7 @@ def _estimate(
     reason = diagnose(surface)
     if any(surface.grid.periodic) and not fit.lattice.periodic:
         reason = _PERIODIC_GAPS
-    if not reason and high - low > _WIDEST:
+    if not reason and high - low > WIDEST:
         reason = f"the heights do not determine the exponent: {low:.2f} to {high:.2f} is as likely"
     return estimate if not reason else estimate.without_interval(reason)
 

@@ -13,6 +13,7 @@ that of the surface. One treatment serves points, blocks, rims and lines of gaps
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
+LEAST_BINS = 3  # an amplitude, an exponent, and one that can contradict them
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
 _SIMULATED = 1 << 18  # modes, of eight surfaces at most: the correction scatters by a fifth of the error of H
 _SAMPLE = 64  # modes of a bin over which an expectation is averaged: error below that of the pilot, .1 %
@@ -210,9 +212,7 @@ def make_bins(
     """
     from scipy.special import digamma, polygamma
 
-    width = _OCTAVE / PER_OCTAVE
-    split = math.log(_ALIASED) if lattice.axes == 2 and not is_tapered else math.inf
-    classes = _classes(lattice, keep, width, split)
+    classes = _bin_classes(lattice, keep, is_tapered=is_tapered)
     ratio, count = power / pilot, classes.count
     total, lnq, places = _sums(classes, ratio, lattice, _MEDIAN_SAMPLE if is_tapered else _SAMPLE)
     mean = total / count
@@ -247,6 +247,17 @@ def make_bins(
         extent=lattice.longest,
         axes=lattice.axes,
     )
+
+
+def bin_numbers(lattice: Lattice, keep: Array) -> Array:
+    """Return the bin of each mode, -1 of those that do not count."""
+    classes = _bin_classes(lattice, keep, is_tapered=False)
+    return np.asarray(classes.joined[classes.number])
+
+
+def _bin_classes(lattice: Lattice, keep: Array, *, is_tapered: bool) -> _Classes:
+    split = math.log(_ALIASED) if lattice.axes == 2 and not is_tapered else math.inf
+    return _classes(lattice, keep, _OCTAVE / PER_OCTAVE, split)
 
 
 def fill(heights: Array, sweeps: int = 12) -> Array:
@@ -292,22 +303,26 @@ def _halved(values: Array) -> Array:
 
 def filling_ratio(lattice: Lattice, pilot: Array, observed: Array) -> Array:
     """Return the power of modes after filling over that before, for Gaussian modes of the pilot."""
-    stream = np.random.default_rng(1)
-    number = max(1, min(8, math.ceil(_SIMULATED / pilot.size)))
     before, after = np.zeros_like(pilot), np.zeros_like(pilot)
-    inner = (slice(None), slice(1, None)) if lattice.axes == 1 else (slice(1, None), slice(1, None))
-    axes = (1,) if lattice.axes == 1 else (0, 1)
-    size = math.prod(lattice.shape[-lattice.axes :])
-    for _ in range(number):
-        modes = np.zeros(lattice.shape)
-        modes[inner] = np.sqrt(pilot) * stream.standard_normal(pilot.shape)
-        heights = fft.dct(modes, 3, axes) / math.sqrt(2.0**lattice.axes * size)
-        before += modes[inner] ** 2
+    for modes, heights in gaussian_surfaces(lattice, pilot):
+        before += modes**2
         after += lattice.power(fill(np.where(observed, heights, np.nan)))
     classes = _classes(lattice, np.ones(pilot.shape, dtype=bool), _OCTAVE / PER_OCTAVE, -math.inf)
     filled, complete = (_sums(classes, power / pilot, lattice, 1)[0] for power in (after, before))
     ratio = np.divide(filled, complete, out=np.ones_like(filled), where=complete > 0.0)
     return np.asarray(np.maximum(ratio, 1e-12)[classes.joined[classes.number]])
+
+
+def gaussian_surfaces(lattice: Lattice, pilot: Array) -> Iterator[tuple[Array, Array]]:
+    """Yield the modes and the heights of some Gaussian surfaces of the expected power `pilot`."""
+    stream = np.random.default_rng(1)
+    inner = (slice(None), slice(1, None)) if lattice.axes == 1 else (slice(1, None), slice(1, None))
+    axes = (1,) if lattice.axes == 1 else (0, 1)
+    size = math.prod(lattice.shape[-lattice.axes :])
+    for _ in range(max(1, min(8, math.ceil(_SIMULATED / pilot.size)))):
+        modes = np.zeros(lattice.shape)
+        modes[inner] = np.sqrt(pilot) * stream.standard_normal(pilot.shape)
+        yield modes[inner], fft.dct(modes, 3, axes) / math.sqrt(2.0**lattice.axes * size)
 
 
 @dataclass(frozen=True)
