@@ -28,7 +28,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 HIGHEST = 12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, the sum a geometric series
 ALIASED, FILTERED, UNALIASED = range(3)
-_LEAST_ALIASED = 0.05  # of a Gaussian: below, aliases are exp(-49) of its highest density
 _SUM_OF_WAVES = 1.0  # spread from which on the sum over waves is the shorter one, exact to 3e-7
 
 
@@ -43,7 +42,7 @@ class Form:
 # ALIASED: blurred, then sampled; FILTERED: sampled, then blurred by Gaussian weights of the neighbours;
 # UNALIASED: without waves that are shorter than two points, as a part of a synthetic periodic surface
 FORMS = {ALIASED: Form(0.75, 0.4), FILTERED: Form(0.0, 0.4), UNALIASED: Form(0.25, 0.2)}
-FIRST_SPREAD, SPREADS = 0.3, 26  # the spreads of a table are even in asinh(s / FIRST_SPREAD)
+FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
 
 
 def mixture(lowest: int) -> Array:
@@ -87,28 +86,36 @@ def kernel_transfer(spread: float, q: Array) -> Array:
     return np.asarray(waves / np.sum(np.exp(-0.5 * np.square(width * turns))))
 
 
-def densities(t: Array, spread: float, q: Array) -> tuple[Array, Array]:
-    """Return the spectral density of each Gaussian on a lattice, with aliases and without, shape (t, q).
+class AxisModes:
+    """Modes along one axis, and the spectral density of Gaussians on a lattice without the effect of edges.
 
-    Neither holds the effect of edges. `t` is per squared point, `spread` in points, q in radians per point.
+    Parameters
+    ----------
+    t : ndarray
+        Scales of the Gaussians, per squared point.
+    q : ndarray
+        Wavenumbers, radians per point.
     """
-    wider = 1.0 + 4.0 * t * spread**2
-    narrow = t / wider
-    inverse = 1.0 / (4.0 * narrow[:, None])
-    unaliased = np.exp(-np.square(q) * inverse)
-    aliased = np.ones(unaliased.shape)
-    # for narrow Gaussians the sum over the points is shorter than that over the waves
-    wide = narrow < 1.0
-    aliased[wide] = unaliased[wide]
-    with_aliases = wide & (narrow > _LEAST_ALIASED)
-    for turn in (-2.0 * np.pi, 2.0 * np.pi):
-        aliased[with_aliases] += np.exp(-np.square(q + turn) * inverse[with_aliases])
-    between = ~wide & (narrow < 40.0)
-    for u in range(1, 5):
-        aliased[between] += 2.0 * np.exp(-narrow[between, None] * u * u) * np.cos(q * u)
-    unaliased *= np.sqrt(np.pi / t)[:, None]
-    aliased[wide] *= np.sqrt(np.pi / narrow[wide, None])
-    return aliased / np.sqrt(wider)[:, None], unaliased
+
+    def __init__(self, t: Array, q: Array) -> None:
+        self.t, self.q = t, q
+        self.waves = [q + turn for turn in (0.0, -2.0 * np.pi, 2.0 * np.pi)]
+        root, inverse = np.sqrt(np.pi / t)[:, None], -0.25 / t[:, None]
+        self.images = [root * np.exp(np.square(wave) * inverse) for wave in self.waves]
+        self.cosines = np.cos(np.outer(np.arange(1.0, 5.0), q))
+
+    def densities(self, spread: float) -> tuple[Array, Array]:
+        """Return the densities after a blur, with aliases and without, shape (t, q); `spread` in points."""
+        blurs = [np.exp(-np.square(spread * wave)) for wave in self.waves]
+        unaliased, left, right = (image * blur for image, blur in zip(self.images, blurs, strict=True))
+        aliased = unaliased + left + right
+        # for narrow Gaussians the sum over the points is shorter than that over the waves
+        wider = 1.0 + 4.0 * self.t * spread**2
+        narrow = self.t / wider
+        for j in np.flatnonzero(narrow >= 1.0):
+            shares = np.exp(-narrow[j] * np.square(np.arange(1.0, 5.0)))
+            aliased[j] = (1.0 + 2.0 * shares @ self.cosines) / np.sqrt(wider[j])
+        return aliased, unaliased
 
 
 def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
@@ -120,7 +127,7 @@ def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
     wider = 1.0 + 4.0 * t * spread**2
     c = np.exp(-(t / wider)[:, None] * np.square(u)) / np.sqrt(wider)[:, None]
     cosine = fft.dct(c * (n - u), 1, (1,))[:, 1:n]
-    sine = np.zeros_like(cosine) if n < 3 else _dst1(c[:, 1:n])
+    sine = np.zeros_like(cosine) if n < 3 else fft.dst(c[:, 1:n], 1, (1,))
     power = (cosine - sine / np.sin(np.pi * np.arange(1, n) / n)) / n
     if detrended:  # modes of z less its line v (v z): E - 2 g (F C v) + g^2 v C v
         v = np.arange(n) - 0.5 * (n - 1)
@@ -130,10 +137,6 @@ def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
         cv = fft.irfft(fft.rfft(both) * fft.rfft(np.pad(v, (0, n - 1))), 2 * n - 1)[:, :n]
         power += -2.0 * g * fft.dct(cv, 2, (1,))[:, 1:] / math.sqrt(2.0 * n) + g * g * (cv @ v)[:, None]
     return np.asarray(np.maximum(power, 1e-14 * c.sum(axis=1, keepdims=True)))
-
-
-def _dst1(lines: Array) -> Array:
-    return fft.dst(lines, 1, (1,))
 
 
 @dataclass(frozen=True)
@@ -168,10 +171,10 @@ class Bins:
     axes: int
 
 
-def spread_nodes(longest: float) -> tuple[Array, Array]:
+def spread_nodes(longest: float, step: float) -> tuple[Array, Array]:
     """Return the spreads of a table up to `longest`, and (FIRST_SPREAD, step of asinh(s / FIRST_SPREAD))."""
-    step = math.asinh(longest / FIRST_SPREAD) / (SPREADS - 3)
-    return FIRST_SPREAD * np.sinh(step * np.arange(SPREADS)), np.array([FIRST_SPREAD, step])
+    number = math.ceil(math.asinh(longest / FIRST_SPREAD) / step) + 3
+    return FIRST_SPREAD * np.sinh(step * np.arange(number)), np.array([FIRST_SPREAD, step])
 
 
 @dataclass(frozen=True)
@@ -265,21 +268,22 @@ class Lattice:
         return [[along_y, along_x] for along_y, along_x in zip(rows, columns, strict=True)]
 
     @cached_property
-    def _sampled(self) -> list[Array]:
-        """Densities along y and x of Gaussians that were sampled without a blur."""
+    def _lines(self) -> list[tuple[AxisModes, Array]]:
+        """Modes along y and x, and their densities for a surface that was sampled without a blur."""
         axes = zip(self.steps, self.spacing, self.wavenumbers, strict=True)
-        return [densities(self.t * step * step, 0.0, q * d)[0] for step, d, q in axes]
+        lines = [AxisModes(self.t * step * step, q * d) for step, d, q in axes]
+        return [(line, line.densities(0.0)[0]) for line in lines]
 
     def _transform(self, axis: int, spread: float, edges: bool) -> list[Array]:
-        n, d, q = self.shape[axis], self.spacing[axis], self.wavenumbers[axis]
+        n, s = self.shape[axis], spread / self.spacing[axis]
         if n == 1:
             return [np.ones((self.t.size, 1))] * len(FORMS)
-        t, s = self.t * self.steps[axis] ** 2, spread / d
-        aliased, unaliased = densities(t, s, q * d)
-        filtered = np.square(kernel_transfer(s, q * d)) * self._sampled[axis]
+        line, sampled = self._lines[axis]
+        aliased, unaliased = line.densities(s)
+        filtered = np.square(kernel_transfer(s, line.q)) * sampled
         if not edges:
             return [aliased, filtered, unaliased]
-        power = free_power(n, t, s, self.axes == 1)
+        power = free_power(n, line.t, s, self.axes == 1)
         # the edges feel long waves alone, which are alike in all forms
         leak = power - aliased
         return [power, *(np.maximum(leak + clean, 1e-14 * power) for clean in (filtered, unaliased))]

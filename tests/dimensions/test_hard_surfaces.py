@@ -110,3 +110,13 @@ def test_what_is_said_of_a_map_does_not_depend_on_its_orientation(damage):
         exponents.append(float(result.hurst[0]))
     assert len(reasons) == 1, reasons
     assert np.ptp(exponents) <= 0.01  # modes are averaged over an even sample of each bin
+
+
+@pytest.mark.parametrize("seed", [5, 15])
+def test_a_slightly_blurred_map_of_512_points(seed):
+    # with a coarser table of the expected power another exponent, .8, was as probable
+    heights = fc.surfaces.fbm((560, 560), 1e-4, hurst=0.5, rms_increment=1e-6, rng=seed).values
+    blurred = ndimage.gaussian_filter(heights, 1.0)[24:-24, 24:-24]
+    found = fc.dimensions.estimate(fc.surfaces.from_array(blurred, 1e-4)).isel(method=0)
+    assert found.hurst == pytest.approx(0.5, abs=0.03)
+    assert 0.02 < float(found.ci_high - found.ci_low) < 0.05
