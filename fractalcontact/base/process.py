@@ -71,12 +71,15 @@ def collect_rarely() -> None:
     atexit.register(gc.freeze)
 
 
-def calls_in_two_processes(function: Callable[[int], R], count: int) -> Iterator[tuple[int, R]]:
+def calls_in_two_processes(
+    function: Callable[[int], R], count: int, meanwhile: Callable[[], object] | None = None
+) -> Iterator[tuple[int, R]]:
     """Call ``function(n)`` for the numbers below `count`; yield n and result as a call ends.
 
     For calls that hold the interpreter lock. A forked copy of this process shares them: it needs no imports,
     no pickled arguments and no guard in a script. Its results and warnings come back pickled. Call 0, and
-    calls that the copy does not end, for whatever reason, are made here.
+    calls that the copy does not end, for whatever reason, are made here. Before this process waits for the
+    last call of the copy it does what is needed later, `meanwhile`.
     """
     if not 2 <= count <= MOST_CALLS or not can_fork():
         for number in range(count):
@@ -105,6 +108,8 @@ def calls_in_two_processes(function: Callable[[int], R], count: int) -> Iterator
             for number, result in _received(receiver, 0.0):
                 left.discard(number)
                 yield number, result
+        if meanwhile is not None and left:
+            meanwhile()
         for number, result in _received(receiver, PATIENCE + 10.0 * longest):
             left.discard(number)
             yield number, result

@@ -127,11 +127,13 @@ def run_tasks(
     workers: Workers | None = None,
     *,
     points: int,
+    meanwhile: Callable[[], object] | None = None,
 ) -> Generator[tuple[K, R], None, None]:
     """Yield key and result of every task as it finishes; a task that a stop cut short is left out.
 
     Without workers a copy of this process shares the tasks of a surface of few `points`, where that is worth
-    it by their number and the points, or by the time of the last task.
+    it by their number and the points, or by the time of the last task. This process does what is needed
+    later, `meanwhile`, before it waits for the copy.
     """
     if workers is not None:
         yield from _run_on_workers(tasks, store, stop, workers)
@@ -152,7 +154,7 @@ def run_tasks(
         with resources.limit(half):
             return left[keys[place]](store, stop)
 
-    for place, result in calls_in_two_processes(run_one, len(keys)):
+    for place, result in calls_in_two_processes(run_one, len(keys), meanwhile):
         if result is not None:
             yield keys[place], result
 

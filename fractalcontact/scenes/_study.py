@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -154,20 +154,26 @@ class Study:
 
     def _run_stages(self, stages: list[Stage], stop: signals.Stop) -> None:
         """Run the missing parts of stages that do not need each other, and join them."""
-        tasks: dict[tuple[str, int], _PartTask] = {}
+        of_stages: list[dict[tuple[str, int], _PartTask]] = []
         for stage in (stage for stage in stages if not self._lacks(stage)):
             try:
                 self.works[stage.name] = _parts.stage_work(
                     stage, self.scene, self.results, self.works, self.faces
                 )
-                tasks |= self._tasks(stage)
+                of_stages.append(self._tasks(stage))
             except Exception as error:
                 self._fail(stage.name, error)
+        # stages in one part first: the short parts of the others then end at the same time in two processes
+        tasks = {key: task for own in sorted(of_stages, key=len) for key, task in own.items()}
         several = len(tasks) > 1
         workers = self.workers if several else None
         show = self.progress and several
         # closed after an error too: parts that a copy of this process has begun are kept
-        with closing(run_tasks(tasks, self.store, stop, workers, points=self._points)) as finished:
+        draws = self.store.folder is not None and self.scene.want.figures
+        running = run_tasks(
+            tasks, self.store, stop, workers, points=self._points, meanwhile=_load_plotting if draws else None
+        )
+        with closing(running) as finished:
             bar = track(finished, show, self.scene.name, unit="part", total=len(tasks))
             for key, (results, seconds) in bar:
                 for name, result, spent in zip(tasks[key].stages, results, seconds, strict=True):
@@ -263,6 +269,15 @@ def reason_of(error: Exception) -> str:
     return (
         "; ".join(error.problems) if isinstance(error, InvalidInput) else f"{type(error).__name__}: {error}"
     )
+
+
+def _load_plotting() -> None:
+    """Import what draws the figures, which takes .25 s."""
+    with suppress(ImportError):  # raised again when the figures are drawn, after the results are saved
+        import matplotlib.backends.backend_agg
+        import matplotlib.figure  # noqa: F401
+
+        from fractalcontact.plotting import draw  # noqa: F401
 
 
 def _is_fast_to_repeat(stage: Stage, scene: Scene) -> bool:
