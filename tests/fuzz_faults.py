@@ -76,7 +76,7 @@ def fault_of(call, *, seconds=20, names=(), refused=True):
         for number, timer in alarms.items():
             signal.setitimer(timer, 0)
             signal.signal(number, before[number])
-    return _infinite(result)
+    return infinite(result)
 
 
 def _unnamed(error, names):
@@ -87,7 +87,8 @@ def _unnamed(error, names):
     return None
 
 
-def _infinite(result):
+def infinite(result):
+    """Return which numbers of a result are infinite, if any."""
     if isinstance(result, xr.Dataset):
         numbers = {
             str(name): np.isinf(variable.values).any()

@@ -1,5 +1,7 @@
 """Every public function that returns labelled data: labels of the schema, a compliant file, a round trip."""
 
+import json
+
 import netCDF4
 import pytest
 import xarray as xr
@@ -57,7 +59,9 @@ def test_labels_file_and_round_trip(name, tmp_path, compliance):
         assert variable.attrs["long_name"], (name, key)
         if variable.ndim >= 2 and {"y", "x"} <= set(variable.dims):
             assert variable.dims[-2:] == ("y", "x"), (name, key)
-    assert "provenance" in result.attrs, name
+    called = json.loads(result.attrs["provenance"])["call"]
+    assert called == f"fractalcontact.{name}"
+    assert "/" not in result.attrs["history"].split()[-1]
     path = fc.save(result, tmp_path / "result.nc")
     assert compliance(path) == [], name
     description = file_contents(path)

@@ -1,6 +1,7 @@
 """Every argument of the public functions with extreme and wrong values: a result or a clear error."""
 
 import inspect
+import random
 import warnings
 
 import numpy as np
@@ -24,12 +25,15 @@ QUICK = {
 }
 
 
+# `tests/fuzz/test_pairs.py` tries values that every argument must refuse
+@pytest.mark.parametrize("count", [8, pytest.param(len(WRONG), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", [*labelled_functions(), *sorted(UNLABELLED & CALLS.keys())])
-def test_wrong_argument_gives_a_result_or_a_clear_error(name):
+def test_wrong_argument_gives_a_result_or_a_clear_error(name, count, request):
+    """Every argument with some of the values, others every day (see tests/fuzz)."""
     function, given = function_of(name), CALLS[name]() | QUICK.get(name, {})
-    failed = []
+    failed, stream = [], random.Random(f"{request.config.getoption('--seed')}, {name}")
     for argument in inspect.signature(function).parameters:
-        for value in WRONG:
+        for value in stream.sample(WRONG, count):
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", FractalContactWarning)

@@ -69,8 +69,8 @@ def test_profile_is_not_changed_by_a_tilt():
     np.testing.assert_allclose(result.hurst, scaling(heights).hurst, atol=1e-6)
 
 
-# of 16 intervals of 95 %, fewer than 14 hold in one case of 23
-@pytest.mark.parametrize(("members", "least"), [(10, 0.79), pytest.param(100, 0.88, marks=pytest.mark.slow)])
+# of 6 intervals of 95 %, fewer than 5 hold in one case of 30
+@pytest.mark.parametrize(("members", "least"), [(6, 0.8), pytest.param(100, 0.88, marks=pytest.mark.slow)])
 def test_coverage_of_octaves(members, least):
     rng = np.random.default_rng(5)
     surfaces = fc.surfaces.fbm((64, 64), SPACING, hurst=0.4, rms_increment=1e-6, members=members, rng=rng)
@@ -99,7 +99,7 @@ def test_gaps_change_no_octave_by_more_than_its_error():
         assert float(result.window_ci_low) < 0.4 < float(result.window_ci_high)
 
 
-@pytest.mark.parametrize(("seeds", "least"), [(6, 5), pytest.param(12, 9, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seeds", "least"), [(4, 3), pytest.param(12, 9, marks=pytest.mark.slow)])
 def test_window_beside_a_blur_holds_the_exponent(seeds, least):
     """Without the octave that the blur still bends: with it no interval holds 0.5."""
     inside = 0

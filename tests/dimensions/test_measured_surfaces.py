@@ -261,12 +261,12 @@ def test_any_surface_has_an_estimate_or_a_reason(part):
 def test_small_whole_periodic_surfaces_without_waves_in_some_directions(points, hurst):
     """So few points have no long waves near the axes: those directions say nothing, they are not flat."""
     held, exponents = [], []
-    for seed in range(10):
+    for seed in range(6):
         surface = fc.surfaces.spectral((points, points), 1e-5, hurst=hurst, rms_height=3e-6, rng=seed)
         result = fc.dimensions.estimate(surface).isel(method=0)
         held.append(float(result.ci_low) <= hurst <= float(result.ci_high))
         exponents.append(float(result.hurst))
-    assert sum(held) >= 8  # of intervals of 95 %
+    assert sum(held) >= 5  # of intervals of 95 %
     assert np.median(exponents) == pytest.approx(hurst, abs=0.1)
 
 

@@ -215,7 +215,7 @@ def test_law_is_seldom_preferred_where_both_are_as_good():
     exponential = 1e-5 * np.log(p / 2e5)
     fitted = fc.joints.closure_laws(law(p, exponential))
     other = hyperbola(p, float(fitted.initial_stiffness), float(fitted.greatest_closure))
-    noise = 3e-7 * np.random.default_rng(3).standard_normal((400, p.size))
+    noise = 3e-7 * np.random.default_rng(3).standard_normal((200, p.size))
     joints = xr.Dataset(
         {"interface_closure": (("joint", "step"), 0.5 * (exponential + other) + noise)},
         coords={"nominal_pressure": ("step", p)},
@@ -224,9 +224,9 @@ def test_law_is_seldom_preferred_where_both_are_as_good():
     assert 0.0 < float(decided) < 0.08
 
 
-@pytest.mark.parametrize(("paths", "slack"), [(300, 0.035), pytest.param(1000, 0.02, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("paths", "slack"), [(150, 0.05), pytest.param(1000, 0.02, marks=pytest.mark.slow)])
 def test_intervals_have_their_coverage(paths, slack):
-    """95 % of scattered paths; the standard error of the share is 1.3 % for 300 and 0.7 % for 1000 paths."""
+    """95 % of scattered paths; the standard error of the share is 1.8 % for 150 and 0.7 % for 1000 paths."""
     p = np.geomspace(1e5, 1e7, 10)
     truth = {
         "closure_length": 3e-6, "reference_pressure": 2e4,

@@ -38,7 +38,7 @@ def moved_pair(rough, shift, *, noise=0.0, seed=3, angle=0.0, size=120):
     return plane[cut, cut], upper[cut, cut] + 5e-4 + noise * 1e-3 * rng.standard_normal((size, size))
 
 
-@pytest.mark.parametrize("shift", [(0.0, 0.0), (1.3, -2.7), (0.5, 0.5), (-17.25, 9.0), (25.0, 30.4)])
+@pytest.mark.parametrize("shift", [(0.5, 0.5), (-17.25, 9.0), (25.0, 30.4)])
 def test_known_shift_is_recovered(make_face, rough, shift):
     lower, upper = moved_pair(rough, shift)
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
@@ -55,7 +55,7 @@ def test_known_shift_is_recovered(make_face, rough, shift):
 
 @pytest.mark.parametrize("angle", [6.0, 20.0])
 def test_rotation_beyond_a_few_degrees_is_refused(make_face, rough, angle):
-    lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle, size=150))
+    lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle))
     if angle > 10:
         # too far for the first guess: an error, or a warning that the position is not determined
         with pytest.raises((ValueError, ConvergenceWarning), match="turned by a few degrees at most"):
@@ -294,7 +294,7 @@ def test_study_of_the_gneiss_pair(mated):
     assert flow.percolates.all()
 
 
-@pytest.mark.parametrize("seed", [11, 12, 13, 14])
+@pytest.mark.parametrize("seed", [11, 12, *(pytest.param(n, marks=pytest.mark.slow) for n in (13, 14))])
 def test_motion_is_recovered_with_noise_and_gaps(make_face, rough, seed):
     rng = np.random.default_rng(seed)
     shift, angle = rng.uniform(-8, 8, 2), float(rng.uniform(-2, 2))

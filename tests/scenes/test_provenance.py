@@ -53,11 +53,16 @@ domains = [
     "signature",
 ]
 """
-# without three stages whose parts are those of one part each
-SHORT = STUDY.replace('"elimination", "area_dimension", "self_weight",', "")
-DOMAINS_OF_A_JOINT = SHORT.replace('contact = ["press"]', 'keep = ["state"]')
-ENSEMBLE = DOMAINS_OF_A_JOINT.replace("rng = 5", "rng = 5\nmembers = 2").replace(
-    '"box_counts", "boundary_dimension", "lacunarity", ', ""
+JOINTS = STUDY.partition("joints = [")[2].partition("]")[0]
+ESTIMATES = 'dimensions = ["likelihood", "variogram"]\n'
+# what the sections of a path change: results along it
+PATH = STUDY.replace(JOINTS, '"closure", "friction"').replace(ESTIMATES, "")
+DOMAINS_OF_A_JOINT = PATH.replace('contact = ["press"]', 'keep = ["state"]')
+ENSEMBLE = (
+    STUDY.replace('contact = ["press"]', 'keep = ["state"]')
+    .replace('"elimination", "area_dimension", "self_weight",', "")
+    .replace("rng = 5", "rng = 5\nmembers = 2")
+    .replace('"box_counts", "boundary_dimension", "lacunarity", ', "")
 )
 
 
@@ -85,27 +90,37 @@ def check_equal(stored, made):
             ), name
 
 
-@pytest.fixture(scope="module", params=["one part each", "sections of a path", "domains of a joint"])
-def study(request, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("study")
-    with pytest.MonkeyPatch.context() as patch:
-        if request.param == "sections of a path":
-            patch.setattr("fractalcontact.scenes._stages.PART_SIZE", 32 * 32)
-        texts = {
-            "one part each": STUDY,
-            "sections of a path": SHORT,
-            "domains of a joint": DOMAINS_OF_A_JOINT,
-        }
-        text = texts[request.param]
-        fc.scenes.run(write(folder, text), out=folder, progress=False)
+def stored_study(folder, text):
+    fc.scenes.run(write(folder, text), out=folder, progress=False)
     return fc.open(folder / "result.nc")
 
 
-def test_every_group_is_made_again(study):
-    groups = stored_groups(study)
-    assert len(groups) > 14
-    for group in groups:
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return stored_study(tmp_path_factory.mktemp("study"), STUDY)
+
+
+def check_all(tree):
+    for group in stored_groups(tree):
         check_equal(group, fc.scenes.reproduce(group))
+
+
+def test_every_group_is_made_again(study):
+    assert len(stored_groups(study)) > 20
+    check_all(study)
+
+
+def test_results_of_a_path_in_sections_are_made_again(tmp_path, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("fractalcontact.scenes._stages.PART_SIZE", 32 * 32)
+        tree = stored_study(tmp_path, PATH)
+    check_all(tree)
+
+
+def test_domains_of_a_joint_are_made_again(tmp_path):
+    tree = stored_study(tmp_path, DOMAINS_OF_A_JOINT)
+    assert len(tree["domains"].children) == 8
+    check_all(tree)
 
 
 def test_joined_group_states_the_whole_call_and_the_worst_residual(study):

@@ -44,16 +44,19 @@ def test_file_has_the_wanted_groups(study):
     assert not list(out.glob(".*"))
 
 
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
-def test_result_is_complete_before_the_figures(study, tmp_path, monkeypatch, error):
+def test_result_is_complete_before_the_figures(study, tmp_path, monkeypatch):
     tree, out = study
-    with monkeypatch.context() as patch:
-        patch.setattr(fc.plotting, "draw", lambda *a, **k: (_ for _ in ()).throw(error))
-        with pytest.raises((InvalidInput, KeyboardInterrupt)) as caught:
-            fc.scenes.run(out.parent / "study.toml", out=tmp_path, progress=False)
-    if isinstance(error, OSError):
-        assert "result.nc, which is complete" in str(caught.value)
-        assert "No space left" in str(caught.value)
+    for error, raised in (
+        (KeyboardInterrupt(), KeyboardInterrupt),
+        (OSError(28, "No space left on device"), InvalidInput),
+    ):
+        with monkeypatch.context() as patch:
+            patch.setattr(fc.plotting, "draw", lambda *a, error=error, **k: (_ for _ in ()).throw(error))
+            with pytest.raises(raised) as caught:
+                fc.scenes.run(out.parent / "study.toml", out=tmp_path, progress=False)
+        assert (tmp_path / "result.nc").is_file()
+    assert "result.nc, which is complete" in str(caught.value)
+    assert "No space left" in str(caught.value)
     saved = fc.open(tmp_path / "result.nc")
     for name in ("joints/closure", "domains/lacunarity", "surfaces"):
         assert set(saved[name].variables) == set(tree[name].variables)

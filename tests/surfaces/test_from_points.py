@@ -260,7 +260,7 @@ def test_directions_use_resolved_lags():
 
 @pytest.mark.parametrize(
     ("hurst", "seeds"),
-    [(0.7, 4), pytest.param(0.7, 16, marks=pytest.mark.slow), pytest.param(0.3, 16, marks=pytest.mark.slow)],
+    [(0.7, 3), pytest.param(0.7, 16, marks=pytest.mark.slow), pytest.param(0.3, 16, marks=pytest.mark.slow)],
 )
 def test_interval_of_a_gridded_profile(hurst, seeds):
     held = []
