@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import zeta
 
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.spectra import aliased_power_law, half_weights, radial_wavenumber
+from fractalcontact.base.spectra import (
+    aliased_line_power_law,
+    aliased_power_law,
+    half_weights,
+    radial_wavenumber,
+)
 
 BOUND_POINTS = 128  # wavevectors along an edge of the quarter plane: 1024 change a bound by up to 1.3 %
 BOUND_STEP = 1e-4  # of the derivative by H: 1e-5 and 1e-3 change a bound by 5e-6 and 2e-4 of it
@@ -21,10 +25,13 @@ def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, al
     Gaussian blur of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer
     function is above one half. Without `aliases` the density is the power law itself.
     """
-    density = aliased_density if axes == 2 else profile_density
     low, high = max(hurst - BOUND_STEP, 1e-6), hurst + BOUND_STEP
-    slope = (np.log(density(high)) - np.log(density(low))) / (high - low)
     w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
+    lower, upper = (
+        aliased_power_law((w[:, None], w), each) if axes == 2 else aliased_line_power_law(w, each)
+        for each in (low, high)
+    )
+    slope = (np.log(upper) - np.log(lower)) / (high - low)
     squares = w[:, None] ** 2 + w**2 if axes == 2 else w**2
     if not aliases:
         slope = -np.log(squares)
@@ -52,19 +59,6 @@ def rolloff_bound(hurst: float, n: int, corner: float, blur: float = 0.0) -> flo
     slope, bend = (part[inside] - part[inside].mean() for part in (slope, bend))
     unexplained = slope - bend * (slope @ bend) / (bend @ bend)
     return float(np.sqrt(2.0 / np.sum(unexplained**2)) * points / n)
-
-
-def aliased_density(hurst: float) -> Array:
-    """Return the spectral density of the sampled surface on a quarter of its wavevectors."""
-    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
-    return aliased_power_law((w[:, None], w), hurst)
-
-
-def profile_density(hurst: float) -> Array:
-    """Return the spectral density of the sampled profile: the sum of |w + 2 pi k|^(-1 - 2 hurst)."""
-    w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS / 2.0
-    power = 1.0 + 2.0 * hurst
-    return np.asarray(zeta(power, w) + zeta(power, 1.0 - w))
 
 
 def band_bound(shape: tuple[int, int], low: float, high: float) -> float:

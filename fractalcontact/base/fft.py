@@ -32,11 +32,11 @@ def writes_in_place() -> bool:
     return library() == "ducc0"
 
 
-def fast_length(n: int, *, real: bool = True) -> int:
-    """Return the smallest length >= n that transforms fast."""
+def fast_length(n: int) -> int:
+    """Return the smallest length >= n that transforms fast, of real numbers."""
     if library() == "ducc0":
-        return int(_ducc0().good_size(int(n), real))
-    return int(_scipy().next_fast_len(int(n), real=real))
+        return int(_ducc0().good_size(int(n), True))
+    return int(_scipy().next_fast_len(int(n), real=True))
 
 
 def rfft2(plane: Array, out: Array | None = None) -> Array:
@@ -123,7 +123,9 @@ def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None
     """
     if library() == "ducc0":
         ny = plane.shape[0]
-        out = _empty_modes(plane, padded) if out is None else out
+        if out is None:
+            shape = padded[0], padded[1] // 2 + 1
+            out = np.empty(shape, dtype=np.result_type(plane.dtype, np.complex64))
         out[ny:] = 0
         in_bands(_transform_rows, _groups(ny), out.size // 2, plane, padded[1], out)
         return _along(_ducc0().c2c, out, 0, out)
@@ -277,10 +279,6 @@ def _undo_rows(start: int, stop: int, modes: Array, width: int, out: Array) -> N
         rows = buffer[:count, :width]
         call(modes[part], out=rows, **options)
         out[part] = rows[:, :nx]
-
-
-def _empty_modes(plane: Array, padded: tuple[int, int]) -> Array:
-    return np.empty((padded[0], padded[1] // 2 + 1), dtype=np.result_type(plane.dtype, np.complex64))
 
 
 def _axis_by_axis(call: Any, array: Array, axes: tuple[int, ...], **options: Any) -> Array:

@@ -94,11 +94,6 @@ def periodic_axes(choice: bool | None, grid: Grid) -> tuple[bool, ...]:
     return grid.periodic if choice is None else (bool(choice),) * len(grid.shape)
 
 
-def centres(n: int, spacing: float, origin: float = 0.0) -> Array:
-    """Return the centres of n cells, the first cell starting at `origin` (m)."""
-    return np.asarray(origin + (np.arange(n) + 0.5) * spacing)
-
-
 def plane_coords(
     shape: Sequence[int], spacing: Sequence[float], periodic: Sequence[bool], dims: Sequence[str] = ("y", "x")
 ) -> dict[str, xr.Variable]:
@@ -106,7 +101,7 @@ def plane_coords(
     coords = {}
     for dim, n, step, wraps in zip(dims, shape, spacing, periodic, strict=True):
         attributes = {"units": "m"} | ({"period": float(n * step)} if wraps else {})
-        coords[dim] = xr.Variable((dim,), centres(int(n), float(step)), attributes)
+        coords[dim] = xr.Variable((dim,), (np.arange(int(n)) + 0.5) * float(step), attributes)
     return coords
 
 

@@ -411,19 +411,17 @@ def as_dataset(array: xr.DataArray) -> xr.Dataset:
 
 def _as_file(result: xr.DataArray | xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
     """Return the groups to write, the root with the attribute Conventions; a DataArray becomes a Dataset."""
+    groups: dict[str, xr.Dataset]
     if isinstance(result, xr.DataTree):
         tree = result.copy(deep=False)  # a tree of its own, even of a part of a tree
         groups = {node.path: node.to_dataset(inherit=False) for node in tree.subtree}
+    elif isinstance(result, xr.DataArray):
+        dataset = as_dataset(result)
+        dataset.attrs[_TYPE] = next(iter(dataset.data_vars))  # so that `open` returns a DataArray
+        groups = {"/": dataset}
     else:
-        groups = {"/": _marked(result) if isinstance(result, xr.DataArray) else result}
+        groups = {"/": result}
     # that of another file could pack the numbers into integers
     groups = {path: encoded(dataset) for path, dataset in groups.items()}
     groups["/"].attrs = {"Conventions": CONVENTIONS} | groups["/"].attrs
     return groups
-
-
-def _marked(array: xr.DataArray) -> xr.Dataset:
-    """Return the array in a Dataset, marked so that `open` returns a DataArray."""
-    dataset = as_dataset(array)
-    dataset.attrs[_TYPE] = next(iter(dataset.data_vars))
-    return dataset

@@ -157,14 +157,12 @@ class Line:
     points: int
 
 
-def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
+def fit_line(scale: Array, value: Array) -> Line:
     """Fit ln value = intercept + slope * ln scale over the finite, positive points.
 
     Parameters
     ----------
     scale, value : ndarray, shape (n,)
-    weights : ndarray, shape (n,), optional
-        Inverse variances of ln value, up to a factor.
 
     Returns
     -------
@@ -172,13 +170,12 @@ def fit_line(scale: Array, value: Array, weights: Array | None = None) -> Line:
         NaN if fewer than two points can be used.
     """
     scale, value = np.asarray(scale, float), np.asarray(value, float)
-    weights = np.ones(scale.shape) if weights is None else np.asarray(weights, float)
     (x, x_unit), (y, y_unit) = logarithm(scale), logarithm(value)
-    usable = np.isfinite(x) & np.isfinite(y) & (weights > 0)
-    x, y, w = x[usable], y[usable], weights[usable]
+    usable = np.isfinite(x) & np.isfinite(y)
+    x, y = x[usable], y[usable]
     if x.size < 2 or np.ptp(x) == 0:
         return Line(np.nan, np.nan, np.nan, int(x.size))
-    w = w / w.sum()
+    w = np.full(x.size, 1.0 / x.size)
     x_mean, y_mean = float(w @ x), float(w @ y)
     spread = float(w @ (x - x_mean) ** 2)
     slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread

@@ -153,7 +153,7 @@ def public_result(
                 entries.setdefault("achieved_error", achieved_error)
             elapsed = time.perf_counter() - start
             if isinstance(result, xr.Dataset):
-                result = _with_run_time(result, elapsed)
+                result = result if "run_time" in result.variables else result.assign(run_time=elapsed)
             entries.setdefault("run_time", elapsed)
             result = label(result, keep_notes=True)
             give_reasons(result, reasons)
@@ -230,71 +230,66 @@ def _memory_errors(name: str) -> Iterator[None]:
         raise TooLittleMemory(name, [f"memory: expected enough for this call, got: {got}"]) from error
 
 
-def _with_run_time(dataset: xr.Dataset, seconds: float) -> xr.Dataset:
-    """Return the result with `run_time`, unless the function has set it."""
-    return dataset if "run_time" in dataset.variables else dataset.assign(run_time=seconds)
-
-
 def public_name(function: Callable[..., Any]) -> str:
     """Return the name under which users call a function of a private module."""
     parts = [part for part in function.__module__.split(".") if not part.startswith("_")]
     return ".".join([*parts, function.__qualname__])
 
 
-_FIT = "NaN where no power law was fitted: the set or the surface is empty, flat or too small"
-_AMPLITUDE = "NaN where the method gives no amplitude, or no power law was fitted"
 _EMPTY = "NaN where the set is empty, or the mask is too small"
-_AREA = "NaN where the set is empty"
-_SLOPE = "NaN where a value is not positive, or stands alone"
-_OCTAVES = "NaN where no run of octaves has one exponent"
-_HEIGHTS = "NaN where too few heights are observed at this scale"
-_FLAT = "NaN where the heights do not vary, or too few are observed"
-_STATE = "NaN where the state has none, see signature_flag and reason, or has no state before it"
-_OF_STATES = ("spot_size", "gap_size", "domain_dimension", "excess_dimension", "clustering", "integral_range")
-_OF_CHANGES = ("gap_size_ratio", "domain_dimension_change", "excess_dimension_change", "clustering_ratio")
-_WITH_ENDS = (*_OF_STATES, *_OF_CHANGES, "integral_range_ratio", "lacunarity_ratio")
-
-REASONS = {
-    **dict.fromkeys((f"{name}{end}" for name in _WITH_ENDS for end in ("", "_low", "_high")), _STATE),
-    **dict.fromkeys(
-        ("local_dimension_min", "local_dimension_max", "spots_dimension", "median_cells"), _STATE
+_FIT = "no power law was fitted"
+_OF_STATES = (
+    *("spot_size", "gap_size", "domain_dimension", "excess_dimension", "clustering", "integral_range"),
+    *("gap_size_ratio", "domain_dimension_change", "excess_dimension_change", "clustering_ratio"),
+    *("integral_range_ratio", "lacunarity_ratio", "pair_correlation_length"),
+)
+_NAMES: dict[str, tuple[str, ...]] = {
+    "NaN where the state has none, see signature_flag and reason, or has no state before it": (
+        *(f"{name}{end}" for name in _OF_STATES for end in ("", "_low", "_high")),
+        *("local_dimension_min", "local_dimension_max", "spots_dimension", "median_cells"),
+        *("hit_fraction", "spots_fraction"),
     ),
-    **dict.fromkeys((f"pair_correlation_length{end}" for end in ("", "_low", "_high")), _STATE),
-    **dict.fromkeys(("hit_fraction", "spots_fraction"), _STATE),
-    **dict.fromkeys(("window_low", "window_high"), "NaN where no window of ratio 4 fits into the mask"),
-    "stationary_exponent": "NaN where a mask is empty, or cells or ratios of spacings do not allow one",
-    **dict.fromkeys(
-        ("scale_min", "scale_max", "fitted_hurst", "fractal_dimension", "singularity_strength"), _FIT
+    "NaN where no window of ratio 4 fits into the mask": ("window_low", "window_high"),
+    "NaN where a mask is empty, or cells or ratios of spacings do not allow one": ("stationary_exponent",),
+    f"NaN where {_FIT}: the set or the surface is empty, flat or too small": (
+        *("scale_min", "scale_max", "fitted_hurst", "fractal_dimension", "singularity_strength"),
+        *("singularity_spectrum", "mass_exponent"),
     ),
-    **dict.fromkeys(("singularity_spectrum", "mass_exponent"), _FIT),
-    **dict.fromkeys(("rms_increment", "topothesy"), _AMPLITUDE),
-    "noise_height": "NaN where the method has no model of noise, or no power law was fitted",
-    "blur_spread": "NaN where the method has no model of blur, or no power law was fitted",
-    "misfit": "NaN where the method has no test of its model, or no power law was fitted",
-    **dict.fromkeys(("window_hurst", "window_ci_low", "window_ci_high"), _OCTAVES),
-    "hurst": _FLAT,
-    "standard_error": "NaN where no interval with tested coverage can be given",
-    **dict.fromkeys(("covering_area", "cube_count", "roughness", "madogram", "variogram"), _HEIGHTS),
-    **dict.fromkeys(("second_variogram", "variation"), _HEIGHTS),
-    **dict.fromkeys(("fluctuation", "divider_length", "higuchi_length"), _HEIGHTS),
-    **dict.fromkeys(("total_perimeter", "largest_island", "mean_island_area"), _AREA),
-    **dict.fromkeys(("largest_length", "mean_island_length"), _AREA),
-    **dict.fromkeys(("null_dimension", "null_spread", "mean_mass", "null_mass"), _EMPTY),
-    **dict.fromkeys(("minkowski_null_dimension", "correlation_null_dimension"), _EMPTY),
-    **dict.fromkeys(("lacunarity", "null_lacunarity", "normalised_lacunarity"), _EMPTY),
-    **dict.fromkeys(("lacunarity_low", "lacunarity_high"), f"{_EMPTY}, or the method gives no interval"),
-    **dict.fromkeys(("box_local_slope", "minkowski_local_slope", "correlation_local_slope"), _SLOPE),
-    "correlation": "NaN where the heights of a face do not vary",
-    "tangential_stiffness": "NaN where periodic bodies stick everywhere: they move together as rigid bodies",
-    "interpolation_error": "NaN where a face has no line without gaps that is long enough to measure it",
-    "scaled_roughness_coefficient": "NaN where the joint roughness coefficient is negative or missing",
-    "uplift_arm": "NaN where there is no uplift",
-    "rotation_error": "NaN where no rotation was fitted, or too few tiles hold observed heights",
-    "aperture": "NaN where the faces do not overlap, or a height is missing",
-    **dict.fromkeys(("dilatancy_angle", "friction_angle"), "NaN where the dilatancy is missing"),
-    **dict.fromkeys(("shear", "azimuth", "closure", "normal_force"), "NaN as in the data given"),
-    "nominal_pressure": "NaN as in the data given",
+    f"NaN where the method gives no amplitude, or {_FIT}": ("rms_increment", "topothesy"),
+    f"NaN where the method has no model of noise, or {_FIT}": ("noise_height",),
+    f"NaN where the method has no model of blur, or {_FIT}": ("blur_spread",),
+    f"NaN where the method has no test of its model, or {_FIT}": ("misfit",),
+    "NaN where no run of octaves has one exponent": ("window_hurst", "window_ci_low", "window_ci_high"),
+    "NaN where the heights do not vary, or too few are observed": ("hurst",),
+    "NaN where no interval with tested coverage can be given": ("standard_error",),
+    "NaN where too few heights are observed at this scale": (
+        *("covering_area", "cube_count", "roughness", "madogram", "variogram", "second_variogram"),
+        *("variation", "fluctuation", "divider_length", "higuchi_length"),
+    ),
+    "NaN where the set is empty": (
+        *("total_perimeter", "largest_island", "mean_island_area", "largest_length", "mean_island_length"),
+    ),
+    _EMPTY: (
+        *("null_dimension", "null_spread", "mean_mass", "null_mass", "minkowski_null_dimension"),
+        *("correlation_null_dimension", "lacunarity", "null_lacunarity", "normalised_lacunarity"),
+    ),
+    f"{_EMPTY}, or the method gives no interval": ("lacunarity_low", "lacunarity_high"),
+    "NaN where a value is not positive, or stands alone": (
+        *("box_local_slope", "minkowski_local_slope", "correlation_local_slope"),
+    ),
+    "NaN where the heights of a face do not vary": ("correlation",),
+    "NaN where periodic bodies stick everywhere: they move together as rigid bodies": (
+        "tangential_stiffness",
+    ),
+    "NaN where a face has no line without gaps that is long enough to measure it": ("interpolation_error",),
+    "NaN where the joint roughness coefficient is negative or missing": ("scaled_roughness_coefficient",),
+    "NaN where no rotation was fitted, or too few tiles hold observed heights": ("rotation_error",),
+    "NaN where the faces do not overlap, or a height is missing": ("aperture",),
+    "NaN where the dilatancy is missing": ("dilatancy_angle", "friction_angle"),
+    "NaN as in the data given": ("shear", "azimuth", "closure", "normal_force", "nominal_pressure"),
 }
+# why a number is missing, where the function states no reason itself
+REASONS = {name: reason for reason, names in _NAMES.items() for name in names}
 
 
 def give_reasons(result: xr.Dataset | xr.DataArray, own: Mapping[str, str]) -> None:

@@ -151,7 +151,6 @@ QUANTITIES: dict[str, Quantity] = {
     "in_window": Quantity("1", "the octave belongs to the longest run with one exponent"),
     "scale_min": Quantity("m", "smallest scale of the fit", other_units=("1",)),
     "scale_max": Quantity("m", "largest scale of the fit", other_units=("1",)),
-    "scale_count": Quantity("1", "number of scales in the fit"),
     "rms_increment": Quantity("m", "root mean square height increment over one lag"),
     "increment_lag": Quantity("m", "lag of the height increment"),
     "noise_height": Quantity("m", "root mean square height of white measurement noise"),

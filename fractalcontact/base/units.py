@@ -82,7 +82,8 @@ def scale_for(units: str, values: Any) -> Scale:
     if not PREFIXED.match(units):
         return Scale(1.0, raise_exponents(units))
     power = int(units[-1]) if units[-1].isdigit() else 1
-    largest = _largest(values)
+    sizes = np.abs(np.asarray(values, dtype=np.float64))
+    largest = float(sizes[np.isfinite(sizes)].max(initial=0.0))
     if largest == 0:
         return Scale(1.0, raise_exponents(units))
     # the largest value is at least .5 of the shown units, .05 m2, .005 m3: 0.2 mm2, not 200 000 um2
@@ -185,10 +186,3 @@ def jrc_text(value: float, decimals: int = 1) -> str:
     ('11.6', 'below 0')
     """
     return "below 0" if value < 0 else fixed(value, decimals)
-
-
-def _largest(values: Any) -> float:
-    """Return the largest finite magnitude, 0 if there is none."""
-    size = np.abs(np.asarray(values, dtype=np.float64))
-    size = size[np.isfinite(size)]
-    return float(size.max()) if size.size else 0.0

@@ -275,11 +275,12 @@ class Problems:
         fits = longest <= 255 and len(name) < 4096  # what file systems hold (NAME_MAX, PATH_MAX)
         return self.require(fits, argument, "names of at most 255 bytes", f"{longest} bytes")
 
-    def file(self, argument: str, value: Any = GIVEN, *, what: str = "an existing file") -> bool:
+    def file(self, argument: str, value: Any = GIVEN) -> bool:
         """Check for the path of a regular file that may be read; a device or a pipe is none."""
         value = self._value(argument, value)
         if not self.path(argument, value):
             return False
+        what = "an existing file"
         try:
             is_file = Path(value).is_file()
         except OSError as error:  # a folder on the way may not be searched

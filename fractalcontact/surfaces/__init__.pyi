@@ -1,12 +1,12 @@
+from ._defects import despike as despike
+from ._defects import fill as fill
 from ._describe import describe as describe
-from ._despike import despike as despike
 from ._fbm import fbm as fbm
-from ._fill import fill as fill
+from ._filters import gaussian_filter as gaussian_filter
+from ._filters import level as level
 from ._fit_plane import fit_plane as fit_plane
 from ._from_array import from_array as from_array
 from ._from_points import from_points as from_points
-from ._gaussian_filter import gaussian_filter as gaussian_filter
-from ._level import level as level
 from ._midpoint import midpoint as midpoint
 from ._read import read as read
 from ._read_points import read_points as read_points

@@ -16,7 +16,7 @@ from fractalcontact.base.regression import RANK, scaled_slopes, shifted
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_stack import check_stack, labelled_rows
+from fractalcontact.surfaces._from_array import check_stack, labelled_rows
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
 

@@ -13,7 +13,7 @@ from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces import _new_surface
+from fractalcontact.surfaces import _from_array
 from fractalcontact.surfaces._circulant import draw, embed, torus_shape
 
 STEIN = (
@@ -23,11 +23,11 @@ STEIN = (
 
 
 def _check(problems: Problems) -> None:
-    _new_surface.check_axes(problems)
+    _from_array.check_axes(problems)
     problems.number("hurst", at_least=0.01, at_most=0.99)
-    _new_surface.check_length(problems, "rms_increment")
-    _new_surface.check_length(problems, "lag", optional=True)
-    _new_surface.check_ensemble(problems)
+    _from_array.check_length(problems, "rms_increment")
+    _from_array.check_length(problems, "lag", optional=True)
+    _from_array.check_ensemble(problems)
 
 
 # the torus of the covariance has 3.9 times as many points an edge as the surface; 2.5 times below H = 0.8
@@ -92,8 +92,8 @@ def fbm(
     >>> print(f"{float((increment**2).mean() ** 0.5):.0e} m")
     1e-06 m
     """
-    (ny, nx), (dy, dx) = _two_axes(shape, spacing)
-    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
+    sizes, steps = _from_array.sizes_and_steps(shape, spacing)
+    (ny, nx), (dy, dx) = (1, *sizes)[-2:], (1.0, *steps)[-2:]  # a profile has ny = 1 and dy = 1
     torus = torus_shape((ny, nx), (dy, dx), float(hurst))
     # of a long surface it has far more points than `memory` counts; its quadrant is transformed
     require_memory(
@@ -118,11 +118,4 @@ def fbm(
         heights *= scale
         return heights.reshape(sizes), entries
 
-    return _new_surface.draw_ensemble(draw_heights, steps, members=members, rng=rng)
-
-
-def _two_axes(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Return (ny, nx) and (dy, dx); a profile has ny = 1 and dy = 1."""
-    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
-    (ny, nx), (dy, dx) = (1, *sizes)[-2:], (1.0, *steps)[-2:]
-    return (ny, nx), (dy, dx)
+    return _from_array.draw_ensemble(draw_heights, steps, members=members, rng=rng)

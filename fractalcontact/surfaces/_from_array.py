@@ -1,19 +1,25 @@
-"""Heights in an array of the user's own, as a surface."""
+"""Arrays of heights as surfaces: those of the user, new ones, ensembles of random draws, stacks with gaps."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import as_array
+from fractalcontact.base import rng as streams
+from fractalcontact.base.grid import DECADES, core_dims, plane_coords
+from fractalcontact.base.labelled import drop_unknown_coords, leading_coords
+from fractalcontact.base.numbers import Array, as_array, float_array, is_real, number_of_axes
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import GIVEN, Problems
-from fractalcontact.surfaces._new_surface import axis_spacing, check_memory, check_spacing, surface_array
+
+SHORTEST, LONGEST = 10.0**-DECADES, 10.0**DECADES  # m
 
 
 def check_heights(problems: Problems, heights: Any = GIVEN) -> int | None:
@@ -150,3 +156,154 @@ def _plane_axes(heights: Any, dims: int) -> int:
 def _is_lazy(values: Any) -> bool:
     """Return whether the array is a dask array."""
     return hasattr(values, "dask")
+
+
+def check_length(problems: Problems, argument: str, *, optional: bool = False) -> bool:
+    """Check for a length in metres."""
+    return problems.number(argument, at_least=SHORTEST, at_most=LONGEST, optional=optional)
+
+
+def check_spacing(problems: Problems, axes: int | None = None, spacing: Any = GIVEN) -> bool:
+    """Check for the spacing in metres: one length, or one for each axis, y first; None allows 1 or 2 axes."""
+    spacing = problems.given.spacing if spacing is GIVEN else spacing
+    if not problems.numbers("spacing", spacing, at_least=SHORTEST, at_most=LONGEST):
+        return False
+    expected = "one length in metres" + (" or (y, x)" if axes != 1 else "")
+    return problems.require(np.size(spacing) in (1, axes or 2), "spacing", expected, spacing)
+
+
+def check_axes(problems: Problems, *, profile: bool = True) -> bool:
+    """Check shape and spacing of new surfaces together; `profile` allows the length of a profile."""
+    shape = problems.given.shape
+    sizes = (shape,) if is_real(shape) else shape
+    is_sequence = isinstance(sizes, (Sequence, np.ndarray)) and not isinstance(sizes, (str, bytes))
+    valid = is_sequence and number_of_axes(sizes) == 1 and len(sizes) in ((1, 2) if profile else (2,))
+    if valid:
+        are_long = [problems.integer("shape", size, at_least=3) for size in sizes]
+        valid = all(are_long)
+    else:
+        problems.add("shape", "(ny, nx)" + (" or the length of a profile" if profile else ""), shape)
+    return check_spacing(problems, np.size(shape) if valid else None) and valid
+
+
+def check_memory(where: str, sizes: Sequence[int]) -> None:
+    """Raise `TooLittleMemory` unless heights of these sizes, and a work array like them, may be taken."""
+    shape = " x ".join(f"{size:g}" for size in sizes if size != 1)
+    needed = 2 * 8.0 * math.prod(float(size) for size in sizes)  # the heights and one work array
+    require_memory(where, needed, f"a shape of {shape} points")
+
+
+def axis_spacing(spacing: Any, axes: int) -> tuple[float, ...]:
+    """Return a spacing that passed `check_spacing` for each axis, y first."""
+    return tuple(float(step) for step in np.broadcast_to(float_array(spacing), axes))
+
+
+def sizes_and_steps(shape: Any, spacing: Any) -> tuple[tuple[int, ...], tuple[float, ...]]:
+    """Return shape and spacing that passed `check_axes`, for each axis, y first."""
+    sizes = tuple(int(size) for size in np.atleast_1d(shape))
+    return sizes, axis_spacing(spacing, len(sizes))
+
+
+def surface_array(
+    heights: Any, spacing: Sequence[float], periodic: Sequence[bool], leading: Mapping[str, Any] | None = None
+) -> xr.DataArray:
+    """Return heights (m) as a DataArray `height` whose first cell starts at the origin.
+
+    Parameters
+    ----------
+    heights : array, shape (..., ny, nx) or (..., nx)
+        numpy or dask.
+    spacing, periodic : sequences
+        One entry for each axis of the plane, y first.
+    leading : mapping, optional
+        Names and coordinates of the leading dims; None stands for the integers from 0.
+    """
+    leading = leading or {}
+    core = ("y", "x")[2 - len(spacing) :]
+    coords: dict[str, Any] = plane_coords(heights.shape[len(leading) :], spacing, periodic, core)
+    for (name, values), size in zip(leading.items(), heights.shape, strict=False):
+        coords[name] = (name, np.arange(size) if values is None else np.asarray(values))
+    return xr.DataArray(heights, coords, (*leading, *core), name="height")
+
+
+def check_ensemble(problems: Problems) -> None:
+    """Check the number of members and the random stream."""
+    problems.integer("members", at_least=1, optional=True)
+    with problems.collect():
+        streams.generator(problems.given.rng)
+
+
+def draw_ensemble(
+    draw: Callable[[np.random.Generator], tuple[Array, dict[str, Any]]],
+    spacing: Sequence[float],
+    *,
+    members: int | None,
+    rng: streams.RNGLike,
+    periodic: bool = False,
+) -> xr.DataArray:
+    """Draw one surface, or `members` of them along a dim `member`.
+
+    Parameters
+    ----------
+    draw : callable
+        Takes a stream; returns the heights (ny, nx) or (nx,) and entries of the provenance.
+    spacing : sequence of float
+        In metres, y first.
+    members : int or None
+        Member i has the i-th stream spawned from `rng`, so it is the same in an ensemble of any size.
+    rng : RNGLike
+        Its record before the first draw is kept as the attribute `random`.
+    periodic : bool
+
+    Returns
+    -------
+    DataArray
+        With the entries of the (first) draw as attributes.
+    """
+    stream = streams.generator(rng)
+    record = streams.record(stream)
+    if members is None:
+        heights, entries = draw(stream)
+    else:
+        drawn = map(draw, stream.spawn(members))
+        first, entries = next(drawn)
+        heights = np.empty((members, *first.shape))
+        heights[0] = first
+        for number, (drawn_heights, _) in enumerate(drawn, 1):
+            heights[number] = drawn_heights
+    leading = None if members is None else {"member": None}
+    surface = surface_array(heights, spacing, (periodic,) * len(spacing), leading)
+    surface.attrs = {"random": record, **entries}
+    return surface
+
+
+def check_stack(problems: Problems, *, smallest: int = 2, is_map: bool = False) -> bool:
+    """Check for planes or profiles, or for one map, of heights that may be missing (NaN) but not infinite."""
+    several = not is_map
+    if not problems.surface("surface", finite=False, smallest=smallest, leading=several, profile=several):
+        return False
+    infinite = int(np.count_nonzero(np.isinf(problems.given.surface.values)))
+    expected = "finite heights, or NaN where missing"
+    return problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
+
+
+def height_stack(surface: xr.DataArray) -> Array:
+    """Return a copy of the heights as float64, shape (planes, ny, nx) or (planes, nx)."""
+    values = np.array(surface.values, dtype=np.float64)
+    return values.reshape(-1, *values.shape[values.ndim - len(core_dims(surface)) :])
+
+
+def with_heights(surface: xr.DataArray, heights: Array) -> xr.DataArray:
+    """Return a surface with other heights on the same points, without the attributes of its own."""
+    result = drop_unknown_coords(surface.copy(data=heights.reshape(surface.shape)).rename("height"))
+    result.attrs = {}
+    return result
+
+
+def labelled_rows(surface: xr.DataArray, rows: Sequence[Mapping[str, float]]) -> xr.Dataset:
+    """Return the quantities of each plane of a surface, a row each, over its leading dims."""
+    leading = surface.dims[: surface.ndim - len(core_dims(surface))]
+    sizes = surface.shape[: len(leading)]
+    columns = {name: np.array([row[name] for row in rows]).reshape(sizes) for name in rows[0]}
+    coords = leading_coords(surface, leading, (*columns, "run_time"))
+    return xr.Dataset({name: (leading, values) for name, values in columns.items()}, coords)

@@ -17,7 +17,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.units import UNITS
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _fit_plane
-from fractalcontact.surfaces._new_surface import check_length
+from fractalcontact.surfaces._from_array import check_length
 
 WHERE = "fractalcontact.surfaces.from_points"
 

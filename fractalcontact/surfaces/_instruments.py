@@ -19,7 +19,7 @@ from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import FileContent, Request
-from fractalcontact.surfaces._new_surface import surface_array
+from fractalcontact.surfaces._from_array import surface_array
 
 WHERE = "fractalcontact.surfaces.read"
 PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"

@@ -14,7 +14,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces import _new_surface
+from fractalcontact.surfaces import _from_array
 
 FOURNIER = (
     "Fournier, Fussell and Carpenter, Computer rendering of stochastic models, Communications of the ACM 25 "
@@ -26,10 +26,10 @@ Points = Sequence[tuple[float, float]]
 
 
 def _check(problems: Problems) -> None:
-    _new_surface.check_axes(problems, profile=False)
+    _from_array.check_axes(problems, profile=False)
     problems.number("hurst", at_least=0.01, at_most=0.99)
-    _new_surface.check_length(problems, "rms_increment")
-    _new_surface.check_ensemble(problems)
+    _from_array.check_length(problems, "rms_increment")
+    _from_array.check_ensemble(problems)
 
 
 @public_result(
@@ -94,7 +94,7 @@ def midpoint(
     >>> dict(surface.sizes), float(surface[0, 0])
     ({'y': 65, 'x': 65}, 0.0)
     """
-    (ny, nx), (dy, dx) = _new_surface.sizes_and_steps(shape, spacing)
+    (ny, nx), (dy, dx) = _from_array.sizes_and_steps(shape, spacing)
     levels = (max(ny, nx) - 2).bit_length()
     # measured at these exponents: see "Theory: surfaces"
     error = float(np.interp(float(hurst), (0.1, 0.3, 0.5, 0.7, 0.9), (1.2, 0.1, 0.27, 0.38, 0.39)))
@@ -104,7 +104,7 @@ def midpoint(
         heights = _displaced(levels, (dy / dx, 1.0), Displacement(float(hurst), bool(additions), stream))
         return float(rms_increment) * heights[:ny, :nx], entries
 
-    return _new_surface.draw_ensemble(draw_heights, (dy, dx), members=members, rng=rng)
+    return _from_array.draw_ensemble(draw_heights, (dy, dx), members=members, rng=rng)
 
 
 @dataclass(frozen=True)

@@ -26,9 +26,8 @@ from fractalcontact.base.validation import NONE, Problems, reading
 from fractalcontact.surfaces import _files, _read_points
 from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request
 from fractalcontact.surfaces._fit_plane import check_frame
-from fractalcontact.surfaces._from_array import check_heights, labelled_heights
+from fractalcontact.surfaces._from_array import axis_spacing, check_heights, check_spacing, labelled_heights
 from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_instrument, read_raster
-from fractalcontact.surfaces._new_surface import axis_spacing, check_spacing
 from fractalcontact.surfaces._read_points import Points
 
 T = TypeVar("T")
@@ -341,7 +340,9 @@ def _netcdf_content(request: Request) -> FileContent:
             array = usual_form(WHERE, array.assign_attrs(units=unit))[0].astype(np.float64)
             array.attrs["units"] = "m"
             if spacing is not None and check_spacing(problems, len(core_dims(array)), spacing):
-                array = _with_spacing(array, spacing)
+                core = core_dims(array)
+                steps, sizes = axis_spacing(spacing, len(core)), [array.sizes[dim] for dim in core]
+                array = array.assign_coords(plane_coords(sizes, steps, [False] * len(core), core))
             problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = stated if stated is None else str(stated)
     array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
@@ -360,14 +361,6 @@ def _height_variables(content: Any) -> dict[str, xr.DataArray]:
         for name, array in group.data_vars.items()
         if "x" in array.dims and array.dtype.kind in "fiu"
     }
-
-
-def _with_spacing(array: xr.DataArray, spacing: Any) -> xr.DataArray:
-    """Return heights with coordinates of another spacing."""
-    core = core_dims(array)
-    sizes = [array.sizes[dim] for dim in core]
-    coords = plane_coords(sizes, axis_spacing(spacing, len(core)), [False] * len(core), core)
-    return array.assign_coords(coords)
 
 
 def _warn_of_scale(content: FileContent, name: str) -> None:

@@ -17,7 +17,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
 from fractalcontact.base.validation import NONE, Problems, given_option
-from fractalcontact.surfaces import _new_surface
+from fractalcontact.surfaces import _from_array
 
 JACOBS = (
     "Jacobs, Junge and Pastewka, Quantitative characterization of surface topography using spectral "
@@ -32,16 +32,16 @@ EDGE = 1e-9  # relative distance from a cut-off within which a mode counts as in
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    valid_plane = _new_surface.check_axes(problems)
+    valid_plane = _from_array.check_axes(problems)
     axes = np.size(given.shape) if valid_plane else 2
     valid_hurst = problems.numbers("hurst", at_least=0.01, at_most=1.0) and problems.require(
         np.size(given.hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else "")
     )
     problems.exactly_one(rms_height=given.rms_height, rms_slope=given.rms_slope)
-    _new_surface.check_length(problems, "rms_height", optional=True)
-    _new_surface.check_length(problems, "rms_slope", optional=True)
+    _from_array.check_length(problems, "rms_height", optional=True)
+    _from_array.check_length(problems, "rms_slope", optional=True)
     cutoffs = {name: getattr(given, name) for name in ("long_cutoff", "rolloff", "short_cutoff")}
-    valid_cutoffs = [_new_surface.check_length(problems, name, optional=True) for name in cutoffs]
+    valid_cutoffs = [_from_array.check_length(problems, name, optional=True) for name in cutoffs]
     if valid_plane and all(valid_cutoffs):
         _check_order(problems)
     problems.choice("normalise", among=("realisation", "expectation"))
@@ -51,10 +51,10 @@ def _check(problems: Problems) -> None:
         isotropic = float(given.anisotropy_ratio) == 1.0
         problems.require(isotropic or one_exponent, "anisotropy_ratio", "1 with two Hurst exponents")
         problems.require(isotropic or axes == 2, "anisotropy_ratio", "1 for a profile")
-    _new_surface.check_ensemble(problems)
+    _from_array.check_ensemble(problems)
     if not problems.messages:
-        sizes = given.members or 1, *_new_surface.axis_sizes(given.shape)
-        _new_surface.check_memory(problems.where, sizes)  # before a look at all the modes
+        sizes = given.members or 1, *np.atleast_1d(given.shape)
+        _from_array.check_memory(problems.where, sizes)  # before a look at all the modes
         band = _Band.of(
             given.shape, given.spacing, given.hurst, cutoffs, given.anisotropy_ratio, given.direction
         )
@@ -64,7 +64,7 @@ def _check(problems: Problems) -> None:
 def _check_order(problems: Problems) -> None:
     """Check that short_cutoff <= rolloff <= long_cutoff and that the grid resolves the short cut-off."""
     given = problems.given
-    sizes, steps = _new_surface.sizes_and_steps(given.shape, given.spacing)
+    sizes, steps = _from_array.sizes_and_steps(given.shape, given.spacing)
     longest, corner, shortest = _wavelengths(
         sizes, steps, given.long_cutoff, given.rolloff, given.short_cutoff
     )
@@ -154,7 +154,7 @@ def spectral(
     >>> round(float(fc.surfaces.describe(surface).rms_slope), 6)
     0.1
     """
-    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
+    sizes, steps = _from_array.sizes_and_steps(shape, spacing)
     target, rms = given_option(rms_height=rms_height, rms_slope=rms_slope)
     of_slope, expected = target == "rms_slope", normalise == "expectation"
     unit = _length_unit(steps)
@@ -170,7 +170,7 @@ def spectral(
         error = _achieved_error(math.sqrt(mean_square / energy), target, expected)
         return heights.reshape(sizes), {"achieved_error": error}
 
-    return _new_surface.draw_ensemble(draw_heights, steps, members=members, rng=rng, periodic=True)
+    return _from_array.draw_ensemble(draw_heights, steps, members=members, rng=rng, periodic=True)
 
 
 def _wavelengths(
@@ -195,7 +195,7 @@ def _length_unit(steps: Sequence[float]) -> float:
 
 def _check_modes(problems: Problems, band: _Band, shape: Any, spacing: Any) -> None:
     """Check that some mode of the grid lies inside the band."""
-    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
+    sizes, steps = _from_array.sizes_and_steps(shape, spacing)
     unit = _length_unit(steps)
     waves = [
         2.0 * math.pi / (n * step / unit) * np.arange(n // 2 + 1)
@@ -267,7 +267,7 @@ class _Band:
         direction: str | float,
     ) -> _Band:
         """Return the band of a surface, with wavenumbers in rad per `_length_unit`."""
-        sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
+        sizes, steps = _from_array.sizes_and_steps(shape, spacing)
         unit = _length_unit(steps)
         low, corner, high = (
             2.0 * math.pi / (length / unit) if length > 0 else math.inf

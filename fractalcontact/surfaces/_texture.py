@@ -15,7 +15,7 @@ from fractalcontact.base.regression import shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.spectra import lagged_products
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._height_stack import check_stack, height_stack, labelled_rows
+from fractalcontact.surfaces._from_array import check_stack, height_stack, labelled_rows
 
 DECAY = 0.2  # of the autocorrelation at the lengths (ISO 25178-2, default of Sal and Str)
 

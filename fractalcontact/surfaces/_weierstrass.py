@@ -13,7 +13,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces import _new_surface
+from fractalcontact.surfaces import _from_array
 
 AUSLOOS = (
     "Ausloos and Berman, A multivariate Weierstrass-Mandelbrot function, Proceedings of the Royal Society of "
@@ -22,12 +22,12 @@ AUSLOOS = (
 
 
 def _check(problems: Problems) -> None:
-    _new_surface.check_axes(problems)
+    _from_array.check_axes(problems)
     problems.number("hurst", above=0, below=1)
-    _new_surface.check_length(problems, "rms_height")
+    _from_array.check_length(problems, "rms_height")
     problems.number("ratio", above=1)
     problems.integer("ridges", at_least=1)
-    _new_surface.check_ensemble(problems)
+    _from_array.check_ensemble(problems)
 
 
 @public_result(
@@ -99,7 +99,7 @@ def weierstrass(
     >>> round(float(surface.std()), 9)
     0.0002
     """
-    sizes, steps = _new_surface.sizes_and_steps(shape, spacing)
+    sizes, steps = _from_array.sizes_and_steps(shape, spacing)
     extent = max(n * step for n, step in zip(sizes, steps, strict=True))
     wavelengths = 1 + int(math.log(extent / (2.0 * max(steps))) / math.log(float(ratio)) * (1.0 + 1e-12))
     directions = int(ridges) if len(sizes) == 2 else 1
@@ -111,7 +111,7 @@ def weierstrass(
         heights *= float(rms_height) / math.sqrt(float(np.mean(heights**2)))
         return heights, {"wavelengths": wavelengths, "parameters": {"ridges": directions}}
 
-    return _new_surface.draw_ensemble(draw_heights, steps, members=members, rng=rng)
+    return _from_array.draw_ensemble(draw_heights, steps, members=members, rng=rng)
 
 
 def _sum_of_waves(

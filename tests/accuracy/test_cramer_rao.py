@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fractalcontact.accuracy import _cramer_rao as cramer_rao
+from fractalcontact.base.spectra import aliased_power_law
 
 
 def test_brownian_bound_matches_the_table():
@@ -42,7 +43,7 @@ def test_aliased_density_matches_a_sum_over_many_more_images():
         np.sum(((w[-1] + 2 * np.pi * j[:, None]) ** 2 + (w[-1] + 2 * np.pi * j) ** 2) ** (-1 - hurst))
         + 2 * np.pi * (801 * np.pi) ** (-2 * hurst) / (2 * hurst) / (2 * np.pi) ** 2
     )
-    assert cramer_rao.aliased_density(hurst)[-1, -1] == pytest.approx(corner, rel=2e-3)
+    assert aliased_power_law((w[-1], w[-1]), hurst)[-1] == pytest.approx(corner, rel=2e-3)
 
 
 def test_band_bound_of_all_modes_tends_to_the_closed_form():

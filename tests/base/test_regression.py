@@ -17,8 +17,8 @@ def test_line_agrees_with_scipy():
         [line.slope, line.intercept, line.standard_error],
         [reference.slope, reference.intercept, reference.stderr],
     )
-    weighted = regression.fit_line(scale, value, weights=np.where(scale < 10, 1.0, 0.0))
-    np.testing.assert_allclose(weighted.slope, stats.linregress(np.log(scale[:6]), np.log(value[:6])).slope)
+    part = regression.fit_line(scale, np.where(scale < 10, value, np.nan))
+    np.testing.assert_allclose(part.slope, stats.linregress(np.log(scale[:6]), np.log(value[:6])).slope)
 
 
 def test_local_slope_of_a_power_law():
@@ -48,7 +48,7 @@ def test_values_of_rounding_beside_large_ones_do_not_overflow():
     value = np.array([1e-320, 5e-324, *(1e3 * scale[2:] ** 2)])
     with np.errstate(all="raise", under="ignore"):
         logarithm, unit = regression.logarithm(value)
-        slope = regression.fit_line(scale, value, weights=np.where(scale > 2, 1.0, 0.0)).slope
+        slope = regression.fit_line(scale[2:], value[2:]).slope
     assert np.isfinite(logarithm[2:]).all()
     np.testing.assert_allclose(logarithm[2:] + unit * np.log(2.0), np.log(value[2:]))
     assert slope == pytest.approx(2.0)
