@@ -2,10 +2,11 @@
 
 import json
 
+import calls
 import netCDF4
 import pytest
 import xarray as xr
-from calls import CALLS, function_of, labelled_functions
+from calls import CALLS, function_of, labelled_functions, rough
 
 import fractalcontact as fc
 from fractalcontact.base.file_contents import file_contents
@@ -31,6 +32,10 @@ def result_of(name):
     return function_of(name)(**(CALLS[name]() | MORE.get(name, {})))
 
 
+def stack():
+    return function_of("surfaces.fbm")(**(CALLS["surfaces.fbm"]() | {"members": 2}))
+
+
 def header(path):
     """Return all that a flat file states of its dimensions and variables, as text: NaN is not itself."""
 
@@ -46,9 +51,30 @@ def header(path):
         return attributes(file), sorted(dimensions), variables
 
 
-@pytest.mark.parametrize("name", labelled_functions())
+# results of other dims
+OTHERS = {
+    "members": ("surfaces.spectral", {"members": 2}),
+    "description of members": ("surfaces.describe", {"surface": stack}),
+    "a plane": ("surfaces.describe", {"surface": lambda: 0.0 * rough().assign_attrs(units="m")}),
+    "one position": ("joints.delta_surface", {"shear": 1e-4, "direction": 30.0}),
+    "angles and forces": ("joints.dilatancy", {"direction": ["E", 30.0], "normal_force": [1.0, 50.0],
+                                               "keep": ("state",)}),
+    "a spring": ("joints.dilatancy", {"direction": ["E", "W"], "normal_force": [1.0, 50.0],
+                                      "normal_stiffness": 1e10}),
+    "imposed closures": ("joints.closure", {"normal_force": None, "closure": [1e-6, 2e-6],
+                                            "keep": ("state", "gap", "pressure")}),
+    "rigid faces": ("joints.friction", {"dilatancy": lambda: calls.result_of("joints.dilatancy")}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*labelled_functions(), *OTHERS])
 def test_labels_file_and_round_trip(name, tmp_path, compliance):
-    result = result_of(name)
+    if name in OTHERS:
+        name, changes = OTHERS[name]
+        changes = {key: value() if callable(value) else value for key, value in changes.items()}
+        result = function_of(name)(**(CALLS[name]() | changes))
+    else:
+        result = result_of(name)
     assert isinstance(result, (xr.Dataset, xr.DataArray)), f"{name} returns a {type(result).__name__}"
     dataset = result if isinstance(result, xr.Dataset) else result.to_dataset(name=result.name)
     for key, variable in dataset.variables.items():

@@ -1,10 +1,9 @@
-"""Properties of every generator: shape, streams, members, units, files."""
+"""Properties of every generator: shape, streams, members, units."""
 
 import json
 
 import numpy as np
 import pytest
-import xarray as xr
 
 import fractalcontact as fc
 
@@ -57,21 +56,3 @@ def test_powers_of_two_change_no_bit(name):
     lengths = {key: 2.0**20 * value for key, value in GENERATORS[name].items() if key != "hurst"}
     scaled = generate(name, spacing=1e-3 * 2.0**-20, **lengths)
     np.testing.assert_array_equal(scaled.values, generate(name).values * 2.0**20)
-
-
-RESULTS = {
-    **{name: lambda name=name: generate(name, members=2) for name in GENERATORS},
-    "from_array": lambda: fc.surfaces.from_array(np.eye(5), 1e-3, periodic=True),
-    "level": lambda: fc.surfaces.level(generate("fbm")),
-    "fill": lambda: fc.surfaces.fill(generate("fbm").where(generate("fbm").x > 2e-3)),
-    "describe": lambda: fc.surfaces.describe(generate("fbm", members=2)),
-    "flat": lambda: fc.surfaces.describe(0.0 * generate("fbm").assign_attrs(units="m")),
-}
-
-
-@pytest.mark.parametrize("name", RESULTS)
-def test_results_are_cf_compliant_and_round_trip(name, tmp_path, compliance):
-    result = RESULTS[name]()
-    fc.save(result, tmp_path / "a.nc")
-    assert compliance(tmp_path / "a.nc") == []
-    xr.testing.assert_identical(fc.open(tmp_path / "a.nc"), result)
