@@ -3,13 +3,14 @@
 The expected power of a bin b is
 
     E_b = A { B_b sum_j w_j(H) M_bj(s, form) + nu^2 W_b },                                       (1)
-    B = (1 + (q_0 / q)^(2 p))^((H_2 - H) / p)
+    B = (1 + (q_0 / q)^(2 p))^((H_2 - H) / p),    p = k |H_2 - H|
 
 with the Gaussians j of `_gaussian_mixture`: H is the exponent, s the spread of a blur, nu white noise over
-the rms increment, q_0 the wavenumber beyond which long waves have the exponent H_2, p the sharpness of that
-corner. The amplitude A has a flat prior in ln A, the others those of the constants below. Noise is
-absent with the probability .5, a blur and a corner with .85; blur and sampling take one of three forms
-(`_gaussian_mixture.FORMS`). Two surfaces that were added have p = H_2 - H, H_2 above H. The logarithms of
+the rms increment, q_0 the wavenumber beyond which long waves have the exponent H_2, k the sharpness of that
+corner: 1 where two surfaces were added, 1 / (1 + H) of a Matern covariance, large of a sudden plateau. The
+amplitude A has a flat prior in ln A, the others those of the constants below. Noise is absent with the
+probability .5, a blur and a corner with .85; blur and sampling take one of three forms
+(`_gaussian_mixture.FORMS`). The logarithms of
 the bins are normal, and
 
     y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
@@ -20,7 +21,8 @@ nothing, with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / 
 prior probability (`_discrepancies`).
 
 For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
-unit normal variables u, and Laplace's method gives its evidence and a normal distribution of u. The
+unit normal variables u (the maxima, where the model holds), and Laplace's method gives its evidence and a
+normal distribution of u. The
 posterior of H is the sum of these normal distributions: no sampling, and continuous in the heights.
 """
 
@@ -50,13 +52,12 @@ _PRIOR_NOISE = math.log(0.05), 1.0
 _PRIOR_SPREAD = 0.0, 0.8  # normal in ln s, spacings: instruments sample a blur at .2 to 5 spacings
 _BLURRED = 0.15  # probability of a blur: with .5, 3 of 40 exact surfaces of 64 x 64 points were 5 bounds off
 _LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any other self-affine surface
-_SHARPNESSES = 0.4, 10.0  # a slow change between two exponents, a sudden corner
+_PRIOR_SHARPNESS = 0.0, 0.7  # normal in ln k, about the sum of two surfaces: 95 % are .25 to 4
 _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
-# corner, exponent of long waves and sharpness, with their probability: none, any, and the sum of two surfaces
-# (sharpness 0). Of 24 sums with lags of 3 and 8 the intervals of 3 hold H without the last, with .01, .02 and
-# .05 those of 20, 22 and 23; beside a roll-off at half the extent the lower half of an interval is then
-# .06, .09, .21 and .33 wide.
-_BENDS = {(0.0, 0.0, 1.0): 0.85, (math.nan, math.nan, math.nan): 0.14, (math.nan, math.nan, 0.0): 0.01}
+# probability of a corner. Of 160 sums each that are equal at a lag of 3 and of 8 spacings 124 and 138
+# intervals hold H with .1, 130 and 141 with .12, 137 and 148 with .15; 40 exact intervals each at H .2, .5
+# and .9 are .028, .041 and .061 wide with .1, .029 .042 .063 with .12, .032 .044 .065 with .15
+_BENT = 0.12
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
 _FOURTH = 0.1  # of (s q)^4: the fourth cumulant of a mean over a box has .125
 # probability that (1) holds without a process: with .8 exact intervals are as narrow as without sums
@@ -68,6 +69,7 @@ _DEEPEST = 3.5  # octaves beyond a cut: filters of up to ten points, a levelled 
 _OCTAVE = math.log(2.0)
 
 _STARTS, _ATTEMPTS, _STEPS = 64, 5, 12
+_SAME = 1.0  # squared distance of maxima, in u, that are one: with .1 and 2 the same within 6 % of a width
 _FLAT = 1e3  # variance of ln A: two deviations are a factor of e^63
 _GRID, _ZOOMS, _NEGLIGIBLE = 2001, 5, 20.0  # of a product of densities: points, refinements, log density
 
@@ -124,14 +126,15 @@ class Discrepancy:
 @dataclass(frozen=True)
 class Posterior:
     """Sum of normal distributions of u = Phi^-1((H - LOWEST) / (HIGHEST - LOWEST)), hypotheses by
-    discrepancies.
+    maxima.
 
     Attributes
     ----------
-    share, centre, scale : ndarray, shape (hypotheses, discrepancies)
-    theta : ndarray, shape (hypotheses, discrepancies, 6)
-        At the maximum of each.
-    hypotheses, discrepancies : list
+    share, centre, scale : ndarray, shape (hypotheses, maxima)
+    theta : ndarray, shape (hypotheses, maxima, 6)
+    hypotheses : list
+    discrepancies : list
+        Of each maximum: the first kind has several.
     """
 
     share: Array
@@ -203,7 +206,7 @@ def hypotheses(spread: float | None, noise: float | None, background: float) -> 
     """
     nan = math.nan
     found = []
-    for form, is_blurred, is_noisy, bend in itertools.product(FORMS, (False, True), (False, True), _BENDS):
+    for form, is_blurred, is_noisy, is_bent in itertools.product(FORMS, *[(False, True)] * 3):
         if (is_blurred and spread is not None) or (is_noisy and noise is not None):
             continue
         prior = FORMS[form].prior_blurred if is_blurred or spread else FORMS[form].prior
@@ -212,9 +215,11 @@ def hypotheses(spread: float | None, noise: float | None, background: float) -> 
         if spread is None:
             prior *= _BLURRED if is_blurred else 1.0 - _BLURRED
         prior *= 1.0 if noise is not None else 0.5
+        prior *= _BENT if is_bent else 1.0 - _BENT
         blur = nan if is_blurred else spread or 0.0
         white = nan if is_noisy else math.hypot(noise or 0.0, background)
-        found.append(Hypothesis(form, (nan, blur, white, *bend), math.log(prior * _BENDS[bend])))
+        bend = (nan, nan, nan) if is_bent else (0.0, 0.0, 1.0)
+        found.append(Hypothesis(form, (nan, blur, white, *bend), math.log(prior)))
     return found
 
 
@@ -240,7 +245,7 @@ def posterior(
     pilot_spread : float
         A first estimate of the spread, for the scatter of the fourth order.
     is_pilot : bool
-        For a first estimate of the spectrum: with fewer kinds of discrepancy, without sums of surfaces.
+        For a first estimate of the spectrum: with fewer kinds of discrepancy.
     is_window : bool
         The waves were chosen beforehand: without corners and cuts.
     """
@@ -251,14 +256,13 @@ def posterior(
         chosen = [hypothesis for hypothesis in chosen if not hypothesis.is_bent]
     if is_pilot:
         kinds = [kind for kind in kinds if kind.inside[0] and kind.scatter[0] in (0.0, _TAUS[2])]
-        chosen = [hypothesis for hypothesis in chosen if hypothesis.theta[SHARPNESS] != 0.0]
     corners = math.log(0.5 * np.pi / bins.extent), math.log(2.0 * np.pi / _SHORTEST_CORNER)
-    sharpness = math.log(_SHARPNESSES[0]), math.log(_SHARPNESSES[1])
-    ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, sharpness
+    ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, _PRIOR_SHARPNESS
     prior = np.array(ranges).T
     whitening, constants = zip(*(_whitening(kind, bins) for kind in kinds), strict=True)
-    shape = len(chosen), len(kinds)
-    evidence, centre, scale = (np.zeros(shape) for _ in range(3))
+    of_kind = np.r_[np.zeros(_ATTEMPTS - 1, dtype=int), np.arange(len(kinds))]
+    shape = len(chosen), of_kind.size
+    evidence, centre, scale = np.full(shape, -np.inf), np.zeros(shape), np.ones(shape)
     theta = np.zeros((*shape, len(ranges)))
     _maxima(
         _starting_points(),
@@ -273,14 +277,17 @@ def posterior(
         bins.lnq,
         bins.level,
         np.stack(whitening),
+        of_kind,
         evidence,
         centre,
         scale,
         theta,
     )
-    evidence += np.array([hypothesis.log_prior for hypothesis in chosen])[:, None] + np.array(constants)
+    evidence += (
+        np.array([hypothesis.log_prior for hypothesis in chosen])[:, None] + np.array(constants)[of_kind]
+    )
     share = np.exp(evidence - evidence.max())
-    return Posterior(share / share.sum(), centre, scale, theta, chosen, kinds)
+    return Posterior(share / share.sum(), centre, scale, theta, chosen, [kinds[k] for k in of_kind])
 
 
 def _discrepancies(bins: Bins, pilot_spread: float) -> list[Discrepancy]:
@@ -434,14 +441,13 @@ def _parameters(u: Array, fixed: Array, prior: Array, theta: Array) -> None:
     for k in range(u.size):
         if not math.isnan(fixed[k]):
             theta[k] = fixed[k]
-        elif k == 1 or k == 2:
+        elif k == 1 or k == 2 or k == 5:
             theta[k] = math.exp(low[k] + high[k] * u[k])
         else:
             value = low[k] + (high[k] - low[k]) * 0.5 * math.erfc(-u[k] / math.sqrt(2.0))
-            theta[k] = math.exp(value) if k == 3 or k == 5 else value
-    if theta[5] == 0.0:  # the powers of a surface and of a smoother one add up
-        theta[4] = theta[0] + (high[0] - theta[0]) * 0.5 * math.erfc(-u[4] / math.sqrt(2.0))
-        theta[5] = 0.01 if theta[4] - theta[0] < 0.01 else theta[4] - theta[0]
+            theta[k] = math.exp(value) if k == 3 else value
+    p = theta[5] * abs(theta[4] - theta[0])  # of (1)
+    theta[5] = p if p > 0.01 else 0.01
     if theta[3] > 0.0 and theta[1] > 0.0:  # an octave of waves between corner and blur shows the exponent H
         theta[3] = 0.5 / theta[1] if 0.5 / theta[1] < theta[3] else theta[3]
 
@@ -548,12 +554,16 @@ def _maxima(
     lnq: Array,
     level: Array,
     whitening: Array,
+    kinds: Array,
     evidence: Array,
     centre: Array,
     scale: Array,
     theta: Array,
 ) -> None:
-    """Fill for each hypothesis and discrepancy the log evidence, mean and deviation of u_0, and theta."""
+    """Fill for each hypothesis and maximum the log evidence, mean and deviation of u_0, and theta.
+
+    `kinds`: of discrepancy of each maximum; the first one has several, those of the others lie near its best.
+    """
     p, bins = fixed.shape[1], level.size
     values = np.empty(p)
     models = np.empty((starts.shape[0], bins))
@@ -561,9 +571,7 @@ def _maxima(
     jacobian = np.empty((p, bins))
     hessian, lower, damped = np.empty((p, p)), np.empty((p, p)), np.empty((p, p))
     gradient, move, u, trial = np.empty(p), np.empty(p), np.empty(p), np.empty(p)
-    before, after, totals = np.empty(p), np.empty(p), np.empty(starts.shape[0])
-    for i in range(p):
-        after[i] = 0.0
+    before, totals, optima = np.empty(p), np.empty(starts.shape[0]), np.empty((kinds.size, p))
     for m in range(fixed.shape[0]):
         held, table, form, free = fixed[m], tables[forms[m]], forms[m], 0
         problem = (held, prior, form, axes, table, nodes, t, white, lnq)
@@ -573,81 +581,88 @@ def _maxima(
         for d in range(number):
             _parameters(starts[d], held, prior, values)
             bin_power(values, form, axes, table, nodes, t, white, lnq, models[d])
-        for k in range(whitening.shape[0]):
+        best = math.inf
+        for c in range(kinds.size):
+            k = kinds[c]
+            if k == 0 and c > 0 and free <= 2:
+                continue
             white_k = whitening[k]
-            for d in range(number):
+            for d in range(number if c == 0 or k > 0 else 0):  # each start once among those of the first kind
                 totals[d] = math.inf
                 if k == 0 or d % 4 == 0:
                     totals[d] = _whitened(white_k, level, models[d], residual)
-            best = math.inf
-            # the first kind has several maxima; those of the others lie near that of the kind before
-            for _ in range(_ATTEMPTS if k == 0 and free > 2 else 1):
-                start = 0
-                for d in range(number):
-                    if totals[d] < totals[start]:
-                        start = d
-                totals[start] = math.inf
-                damping, objective = 0.0, math.inf
-                for attempt in range(2 if k > 0 else 1):
+            start = 0
+            for d in range(number):
+                if totals[d] < totals[start]:
+                    start = d
+            totals[start] = math.inf
+            damping, objective = 0.0, math.inf
+            for attempt in range(2 if k > 0 else 1):
+                for i in range(p):
+                    trial[i] = starts[start, i] if math.isnan(held[i]) else 0.0
+                if attempt == 1:
+                    _copy(before, trial)
+                total = _misfit(trial, values, shifted, trial_residual, white_k, level, *problem)
+                if attempt == 0 or total < objective:
+                    objective = total
+                    _copy(trial, u)
+                    _copy(shifted, model)
+                    _copy(trial_residual, residual)
+            for _step in range(_STEPS):
+                for i in range(p):
+                    for b in range(bins):
+                        jacobian[i, b] = 0.0
+                    if math.isnan(held[i]):
+                        _copy(u, trial)
+                        trial[i] += 1e-4
+                        _parameters(trial, held, prior, values)
+                        bin_power(values, form, axes, table, nodes, t, white, lnq, shifted)
+                        _whitened(white_k, shifted, model, jacobian[i])
+                        for b in range(bins):
+                            jacobian[i, b] *= 1e4
+                for i in range(p):
+                    gradient[i] = _product(jacobian[i], residual) - u[i]
+                    for j in range(p):
+                        hessian[i, j] = _product(jacobian[i], jacobian[j]) + (1.0 if i == j else 0.0)
+                gain = 0.0
+                for _ in range(6):
                     for i in range(p):
-                        trial[i] = starts[start, i] if math.isnan(held[i]) else 0.0
-                    if attempt == 1:
-                        _copy(before, trial)
+                        for j in range(p):
+                            damped[i, j] = hessian[i, j] * (1.0 + damping if i == j else 1.0)
+                    _factorise(damped, lower)
+                    _solve(lower, gradient, move)
+                    longest = 0.7
+                    for i in range(p):
+                        if abs(move[i]) > longest:
+                            longest = abs(move[i])
+                    for i in range(p):
+                        trial[i] = u[i] + move[i] * (0.7 / longest)
                     total = _misfit(trial, values, shifted, trial_residual, white_k, level, *problem)
-                    if attempt == 0 or total < objective:
+                    if total < objective:
+                        gain = objective - total
                         objective = total
                         _copy(trial, u)
                         _copy(shifted, model)
                         _copy(trial_residual, residual)
-                for _step in range(_STEPS):
-                    for i in range(p):
-                        for b in range(bins):
-                            jacobian[i, b] = 0.0
-                        if math.isnan(held[i]):
-                            _copy(u, trial)
-                            trial[i] += 1e-4
-                            _parameters(trial, held, prior, values)
-                            bin_power(values, form, axes, table, nodes, t, white, lnq, shifted)
-                            _whitened(white_k, shifted, model, jacobian[i])
-                            for b in range(bins):
-                                jacobian[i, b] *= 1e4
-                    for i in range(p):
-                        gradient[i] = _product(jacobian[i], residual) - u[i]
-                        for j in range(p):
-                            hessian[i, j] = _product(jacobian[i], jacobian[j]) + (1.0 if i == j else 0.0)
-                    gain = 0.0
-                    for _ in range(6):
-                        for i in range(p):
-                            for j in range(p):
-                                damped[i, j] = hessian[i, j] * (1.0 + damping if i == j else 1.0)
-                        _factorise(damped, lower)
-                        _solve(lower, gradient, move)
-                        longest = 0.7
-                        for i in range(p):
-                            if abs(move[i]) > longest:
-                                longest = abs(move[i])
-                        for i in range(p):
-                            trial[i] = u[i] + move[i] * (0.7 / longest)
-                        total = _misfit(trial, values, shifted, trial_residual, white_k, level, *problem)
-                        if total < objective:
-                            gain = objective - total
-                            objective = total
-                            _copy(trial, u)
-                            _copy(shifted, model)
-                            _copy(trial_residual, residual)
-                            damping *= 0.2
-                            break
-                        damping = max(0.1, 5.0 * damping)
-                    if gain < 1e-3:
+                        damping *= 0.2
                         break
-                if objective < best:
-                    best = objective
-                    half_log = _factorise(hessian, lower)
-                    for i in range(p):
-                        gradient[i] = 1.0 if i == 0 else 0.0
-                    _solve(lower, gradient, move)
-                    evidence[m, k] = -0.5 * objective - half_log
-                    centre[m, k], scale[m, k] = u[0], math.sqrt(move[0])
-                    _parameters(u, held, prior, theta[m, k])
-                    _copy(u, after)
-            _copy(after, before)
+                    damping = max(0.1, 5.0 * damping)
+                if gain < 1e-3:
+                    break
+            half_log = _factorise(hessian, lower)
+            for i in range(p):
+                gradient[i] = 1.0 if i == 0 else 0.0
+            _solve(lower, gradient, move)
+            evidence[m, c] = -0.5 * objective - half_log
+            centre[m, c], scale[m, c] = u[0], math.sqrt(move[0])
+            _parameters(u, held, prior, theta[m, c])
+            _copy(u, optima[c])
+            for other in range(c if k == 0 else 0):  # found before
+                distance = 0.0
+                for i in range(p):
+                    distance += (optima[other, i] - u[i]) ** 2
+                if distance < _SAME:
+                    evidence[m, c] = -math.inf
+            if k > 0 or objective < best:
+                best = objective
+                _copy(u, before)

@@ -119,7 +119,7 @@ def test_a_step_widens_the_windows_that_it_crosses():
     assert share_held(result, 0.5) > 0.85
     along_axis = fc.dimensions.hurst_map(surface + 3e-5 * (x > 70), 32 * SPACING)
     np.testing.assert_allclose(
-        along_axis.hurst, fc.dimensions.hurst_map(surface, 32 * SPACING).hurst, atol=1e-6
+        along_axis.hurst, fc.dimensions.hurst_map(surface, 32 * SPACING).hurst, atol=1e-3
     )
 
 
