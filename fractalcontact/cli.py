@@ -246,6 +246,7 @@ def _answer(options: argparse.Namespace) -> int:
         heights = surfaces.read(scan, **reading)
         if heights.dims == ("x",):
             return _profile_roughness(heights, Path(folder), Path(scan).name, options)
+        arguments["surface"] = heights
     text = scenes.template(options.question, scan, upper, folder=place, **arguments)
     if options.scene:
         print(text)

@@ -39,7 +39,7 @@ from fractalcontact.base.resources import (
     plane_in,
     require_memory,
 )
-from fractalcontact.base.schema import STOP_REASONS, label
+from fractalcontact.base.schema import STOP_REASONS, Quantity, declare, label
 from fractalcontact.base.study import NO_REFERENCES
 from fractalcontact.base.validation import Problems, did_you_mean
 
@@ -50,6 +50,7 @@ R_co = TypeVar("R_co", covariant=True)
 ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 WORK = {"transforms": "pairs of transforms", "iterations": "iterations"}
 NO_REASONS: Mapping[str, str] = {}
+NO_QUANTITIES: Mapping[str, Quantity] = {}
 
 
 class PublicFunction(Protocol[P, R_co]):
@@ -76,6 +77,7 @@ def public_result(
     in_blocks: bool = False,
     memory: Estimate = ARRAYS,
     reasons: Mapping[str, str] = NO_REASONS,
+    quantities: Mapping[str, Quantity] = NO_QUANTITIES,
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates the call of a public function and labels its result.
 
@@ -99,7 +101,11 @@ def public_result(
         ``memory(plane, arguments)`` (see `base.resources`). More than may be taken is refused beforehand.
     reasons : mapping
         Why a variable of the result has NaN, by name, where the function does not state it itself.
+    quantities : mapping
+        Unit and meaning of the variables that no other function returns, by name; those of several functions
+        are in `base.schema`.
     """
+    declare(quantities)
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
         signature = inspect.signature(function)

@@ -8,7 +8,7 @@ which is a method of xarray.
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -367,11 +367,6 @@ QUANTITIES: dict[str, Quantity] = {
     "wet_fraction": Quantity("1", "area under water pressure over nominal area"),
     "isolated_fraction": Quantity("1", "open area that no water reaches over nominal area"),
     # domains
-    "exponent": Quantity("1", "exponent s of the content"),
-    "hausdorff_content": Quantity(None, "Hausdorff content in m^s, by dyadic squares; mean over the shifts"),
-    "hausdorff_content_min": Quantity(None, "Hausdorff content in m^s, least over the shifts"),
-    "relative_content": Quantity("1", "Hausdorff content over that power of the side of the extent"),
-    "coarsest_side": Quantity("m", "side of the largest square of the cover"),
     "stationary_exponent": Quantity("1", "exponent at which the content does not depend on the resolution"),
     "scale": Quantity("m", "side of the square"),
     "side": Quantity("m", "side of the square"),
@@ -524,6 +519,19 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 T = TypeVar("T", xr.Dataset, xr.DataArray)
+
+
+def declare(quantities: Mapping[str, Quantity]) -> None:
+    """Add the names that one function alone uses, which stand beside it, to the table.
+
+    Raises
+    ------
+    ValueError
+        The table has a name already: it has one meaning in all results.
+    """
+    if taken := sorted(quantities.keys() & QUANTITIES.keys()):
+        raise ValueError(f"expected names that the schema does not have, got {', '.join(taken)}")
+    QUANTITIES.update(quantities)
 
 
 NOTES = ("long_name", "comment", "reason")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -18,7 +17,14 @@ from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REA
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
-from fractalcontact.contact.solver import PRESSURE_CLASSES, Pressed, rms_slope, solve, warn_steep
+from fractalcontact.contact.solver import (
+    PRESSURE_CLASSES,
+    Pressed,
+    rms_slope,
+    solve,
+    solvers_in_words,
+    warn_steep,
+)
 
 UNDETERMINED = (
     "normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement",
@@ -168,8 +174,7 @@ def press(
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     residual = float(np.fmax.reduce(result.variables["residual"].values, axis=None))
-    steps = Counter(name for plane in planes for name in plane.solvers)
-    solvers = ", ".join(f"{name} ({number} steps)" for name, number in steps.items())
+    solvers = solvers_in_words(name for plane in planes for name in plane.solvers)
     stated = {"references": options.references(grid), **options.stated_on(grid), "solver": solvers}
     return result.assign_attrs(stated, achieved_residual=residual)
 

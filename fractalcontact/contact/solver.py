@@ -13,7 +13,8 @@ every step states whether it converged.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -57,6 +58,7 @@ __all__ = [
     "rms_slope",
     "solve",
     "solve_shear",
+    "solvers_in_words",
     "warn_lay",
     "warn_steep",
 ]
@@ -77,6 +79,11 @@ class Pressed:
     maps: dict[str, Array]
     disc_radius: float | None
     solvers: tuple[str, ...]
+
+
+def solvers_in_words(solvers: Iterable[str]) -> str:
+    """Return the solvers of steps for the provenance, each with the number of its steps."""
+    return ", ".join(f"{name} ({number} steps)" for name, number in Counter(solvers).items())
 
 
 def solve(

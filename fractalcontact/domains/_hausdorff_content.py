@@ -18,6 +18,7 @@ from fractalcontact.base.grid import DECADES
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
+from fractalcontact.base.schema import Quantity
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
 from fractalcontact.domains._masks import Array, Planes
@@ -44,7 +45,21 @@ def _check(problems: Problems) -> None:
             problems.require(given.coarsest >= finest * (1 - 1e-9), "coarsest", expected)
 
 
-@public_result(title="Hausdorff content", references=SOURCE, achieved_error="exact", check=_check)
+@public_result(
+    title="Hausdorff content",
+    references=SOURCE,
+    achieved_error="exact",
+    check=_check,
+    quantities={
+        "exponent": Quantity("1", "exponent s of the content"),
+        "hausdorff_content": Quantity(
+            None, "Hausdorff content in m^s, by dyadic squares; mean over the shifts"
+        ),
+        "hausdorff_content_min": Quantity(None, "Hausdorff content in m^s, least over the shifts"),
+        "relative_content": Quantity("1", "Hausdorff content over that power of the side of the extent"),
+        "coarsest_side": Quantity("m", "side of the largest square of the cover"),
+    },
+)
 def hausdorff_content(
     mask: xr.DataArray,
     s: Any = (1.0, 1.5),

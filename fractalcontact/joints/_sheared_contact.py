@@ -170,8 +170,8 @@ class ShearedContact:
         Returns
         -------
         dict of ndarray
-            The scalars of `contact.press`, bulk_closure and interface_closure (m), shape (step,); maps
-            (step, y, x); rms_slope, a number.
+            The scalars of `contact.press`, bulk_closure and interface_closure (m), and the name of the
+            solver, shape (step,); maps (step, y, x); rms_slope, a number.
         """
         from fractalcontact.contact import solver
 
@@ -181,7 +181,7 @@ class ShearedContact:
                 self.heights, pressing.grid, pressing.modulus, pressing.options, load, keep=keep
             )
         columns = pressed.columns | pressed.maps
-        columns["rms_slope"] = np.array(self.rms_slope)
+        columns |= {"rms_slope": np.array(self.rms_slope), "solver": np.array(pressed.solvers)}
         # the mean displacement of a periodic body is a rigid motion: no bulk part, also for a force of NaN
         has_bulk = np.isfinite(pressing.block_stiffness)
         bulk = columns["normal_force"] / pressing.block_stiffness if has_bulk else 0.0 * columns["closure"]
@@ -344,7 +344,7 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     at_load = at_shear.isel(step=[int(found[0]) for found in steps])
     of_steps = [str(name) for name, variable in at_load.variables.items() if variable.dims == ("step",)]
     columns = {name: at_load[name].values for name in of_steps if name != "step"}
-    return columns | {"rms_slope": at_load["rms_slope"].values}
+    return columns | {"rms_slope": at_load["rms_slope"].values, "solver": np.full(len(steps), "as pressed")}
 
 
 def over_directions(pressing: Pressing, pressed: Sequence[Columns]) -> Columns:
@@ -369,9 +369,12 @@ def pressed_dataset(
 
     Without a spring the prescribed load is the same at every shear, and a coordinate of `step` alone.
     """
+    from fractalcontact.contact import solver
+
     crack, load = pressing.crack, pressing.load
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in stacked.items()}
+    solvers = variables.pop("solver")[1]
     coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
     if not has_spring:
         imposed = ("closure",) if load.control == "closure" else ("normal_force", "nominal_pressure")
@@ -386,4 +389,5 @@ def pressed_dataset(
     result["bulk_closure"].attrs["comment"] = BULK[pressing.bulk][1]
     residual = float(np.max(stacked["residual"]))
     stated = {"references": pressing.references, **pressing.options.stated_on(pressing.grid)}
+    stated["solver"] = solver.solvers_in_words(solvers.ravel().tolist())
     return result.assign_attrs(stated, achieved_residual=residual)

@@ -103,7 +103,8 @@ def _at_end(figure: Callable[..., Any], *dims: str) -> Drawing:
 class Row(NamedTuple):
     """A figure: its file, the group and the variable it is drawn from, the drawing and what it needs.
 
-    The `dims` are longer than one; options of the drawing take the groups that `beside` names.
+    Without a variable it is drawn from any Dataset. The `dims` are longer than one; options of the drawing
+    take the groups that `beside` names.
     """
 
     file: str
@@ -116,7 +117,8 @@ class Row(NamedTuple):
 
 BOTH = ("shear", "step")
 STRENGTH, TESTS = "joints/shear_curve", "joints/direct_shear"
-# every figure of a study; of several rows with one file the first that has data is drawn
+# every figure of a study but those that `draw` is given; of several rows with one file the first with data is
+# drawn
 FIGURES = (
     Row("scans", "overview", "status", scans),
     Row("surface", "surfaces", "height", _surface, beside={"delta": "joints/delta_surface"}),
@@ -171,6 +173,7 @@ def draw(
     progress: bool = False,
     formats: Sequence[str] = ("png",),
     units: Units | None = None,
+    figures: Mapping[str, Drawing] | None = None,
 ) -> list[Path]:
     """Draw every figure that a study has data for and write each one as a file.
 
@@ -188,6 +191,9 @@ def draw(
         Any of png, svg, pdf and csv: the numbers of the curves (`curves`), of the figures that have any.
     units : mapping of str to str, optional
         Unit of each variable by name, `{"normal_force": "kN"}`, in all figures. Default: a suitable prefix.
+    figures : mapping of str to function, optional
+        Further figures by the path of their group, `{"domains/percolation": draw_shares}`: functions of its
+        Dataset that return Axes. The file is called as the path, `domains_percolation.png`.
 
     Returns
     -------
@@ -221,20 +227,29 @@ def draw(
         ):
             for word in formats:
                 problems.choice("formats", word, FORMATS)
+        expected = "a mapping of paths of groups to functions, or None"
+        problems.require(figures is None or _are_drawings(figures), "figures", expected, figures)
     if units is not None:
         with Problems(WHERE):
             require_units([node.to_dataset() for node in tree.subtree], units)
         tree = tree.map_over_datasets(lambda dataset: marked(dataset, units))
     with writing(WHERE, "folder", folder):
-        return _draw_all(tree, Path(folder), progress, formats)
+        further = [Row(path.replace("/", "_"), path, "", each) for path, each in (figures or {}).items()]
+        return _draw_all(tree, Path(folder), (*FIGURES, *further), progress, formats)
 
 
-def _draw_all(tree: xr.DataTree, folder: Path, progress: bool, formats: Sequence[str]) -> list[Path]:
-    """Draw every figure into a folder and return the files."""
+def _are_drawings(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(map(callable, value.values()))
+
+
+def _draw_all(
+    tree: xr.DataTree, folder: Path, table: Sequence[Row], progress: bool, formats: Sequence[str]
+) -> list[Path]:
+    """Draw every figure of a table into a folder and return the files."""
     folder.mkdir(parents=True, exist_ok=True)
     members = member_count(tree)
     trees = reduced_trees(tree) if members else [tree]
-    rows = list(_rows_with_data(trees[0]).values())
+    rows = list(_rows_with_data(trees[0], table).values())
     files = [[folder / f"{row.file}.{suffix}" for suffix in formats] for row in rows]
 
     def draw_one(number: int) -> None:
@@ -268,13 +283,13 @@ def _data_of(tree: xr.DataTree, row: Row) -> Any:
         has_curve = any(curve_of(child.to_dataset(inherit=False))[1] for child in node.children.values())
         return node if has_curve else None
     data = group_of(tree, row.group)
-    return data if data is not None and row.variable in data.variables else None
+    return data if data is not None and (not row.variable or row.variable in data.variables) else None
 
 
-def _rows_with_data(tree: xr.DataTree) -> dict[str, Row]:
-    """Return by file the rows of the table that a study has data for."""
+def _rows_with_data(tree: xr.DataTree, table: Sequence[Row]) -> dict[str, Row]:
+    """Return by file the rows of a table that a study has data for."""
     by_file: dict[str, Row] = {}
-    for row in FIGURES:
+    for row in table:
         data = _data_of(tree, row)
         if data is not None and all(data.sizes.get(dim, 0) > 1 for dim in row.dims):
             by_file.setdefault(row.file, row)

@@ -12,9 +12,9 @@ from fractalcontact.base.grid import EXCESS_PER_EDGE
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of, scene_of
 from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
-from fractalcontact.scenes._joint_rows import aperture_as_placed
-from fractalcontact.scenes._overview import OVERVIEW
 from fractalcontact.scenes._result_tables import length
+from fractalcontact.scenes._result_tree import OVERVIEW
+from fractalcontact.scenes._stages import STAGES
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -40,7 +40,12 @@ def caveats(tree: xr.DataTree) -> list[str]:
     """
     if group_of(tree, OVERVIEW) is not None:  # of many scans: it has the caveats of each
         return []
-    return [sentence for rule in RULES for sentence in rule(tree)]
+    sentences = [sentence for rule in RULES for sentence in rule(tree)]
+    for name, stage in STAGES.items():
+        data = group_of(tree, name) if stage.caveats is not None else None
+        if stage.caveats is not None and data is not None:
+            sentences += stage.caveats(tree, data)
+    return sentences
 
 
 def _of_contacts(rule: Callable[[xr.DataTree, str, xr.Dataset], Iterator[str]]) -> Rule:
@@ -118,6 +123,14 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
             ]
             if text:
                 yield f"JRC is {', '.join(text)}"
+
+
+def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
+    """Return the upper less the lower of two measured faces, where they lie; None where they are not kept."""
+    upper, lower = group_of(tree, "joints/faces"), group_of(tree, "surfaces")
+    if upper is None or lower is None or "height" not in upper or "height" not in lower:
+        return None
+    return upper["height"] - lower["height"]
 
 
 def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:
@@ -240,54 +253,11 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
         )
 
 
-def _uplift(tree: xr.DataTree) -> Iterator[str]:
-    """Yield where diagrams are unsafe, water is closed off, or no balance was found."""
-    water = group_of(tree, "joints/uplift")
-    if water is None:
-        return
-    forces = water["uplift_force"]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        more = forces.sel(diagram="joint") / forces.drop_sel(diagram="joint") - 1.0
-    more = more.where(np.isfinite(more))
-    if float(more.max()) > 0:
-        yield (
-            f"joints/uplift: the diagrams are NOT on the safe side: the joint has up to "
-            f"{100 * float(more.max()):.1f} % more uplift."
-        )
-    isolated = float(water["isolated_fraction"].max())
-    if isolated > 0.05:  # less is lost in the pressure beside it
-        yield (
-            f"joints/uplift: up to {100 * isolated:.0f} % of the area is open but closed off from the water; "
-            "over time it may come there too, and the uplift grow."
-        )
-    failed = ~water["converged"]
-    if not bool(failed.any()):
-        return
-    count = f"{int(failed.sum())} of {failed.size}"
-    if "balance_error" not in water:
-        yield f"joints/uplift: {water['converged'].attrs['reason']} in {count} cases."
-        return
-    errors = water["balance_error"].where(failed)
-    if float(errors.min()) < 0:
-        yield (
-            f"joints/uplift: in {int((errors < 0).sum())} of {failed.size} cases the load path of the "
-            "closure ends before the effective stress; give it greater loads."
-        )
-    if float(errors.max()) > 0:
-        yield (
-            f"joints/uplift: in {int((errors > 0).sum())} of {failed.size} cases the water carries more "
-            "than the total stress less the lowest load of the closure: it lifts the joint, or the path "
-            "starts too late."
-        )
-
-
 def _table(tree: xr.DataTree, name: str) -> dict[str, Any]:
     """Return a table of the scene of a study, empty where there is none."""
     table = scene_of(tree).get(name)
     return table if isinstance(table, dict) else {}
 
 
-# the most important first
-RULES: tuple[Rule, ...] = (
-    _no_interval, _spikes, _tilt, _resolution, _true_pressure, _strength, _slopes, _uplift,
-)  # fmt: skip
+# the most important first; behind them come those that the entry of a stage names
+RULES: tuple[Rule, ...] = (_no_interval, _spikes, _tilt, _resolution, _true_pressure, _strength, _slopes)

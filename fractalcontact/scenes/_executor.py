@@ -32,7 +32,7 @@ from typing import Any, TypeVar
 from fractalcontact.base import resources, signals
 from fractalcontact.base.errors import FractalContactError, InvalidInput
 from fractalcontact.base.process import calls_in_two_processes, can_fork, end_with_parent
-from fractalcontact.scenes._checkpoint import MemoryStore, PartStore
+from fractalcontact.scenes._results_folder import MemoryStore, PartStore
 
 R = TypeVar("R")
 K = TypeVar("K")

@@ -27,12 +27,13 @@ from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.study import group_of, member_count, of_member, provenance_of, scene_of
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
-from fractalcontact.scenes import _domain_rows
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, page_of, pictured
+from fractalcontact.scenes._domain_stages import SIGNATURE, SIGNATURE_TABLE
+from fractalcontact.scenes._export import tables
 from fractalcontact.scenes._result_tables import SCAN, spread, table_of
-from fractalcontact.scenes._results_folder import REPORT, is_report
+from fractalcontact.scenes._result_tree import OVERVIEW, pictured
+from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page_of
+from fractalcontact.scenes._stages import OWN_FIGURES
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
-from fractalcontact.scenes._tables import tables
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -121,7 +122,7 @@ def report(
         if pictures is None:
             from fractalcontact import plotting  # only here: `run` has drawn them
 
-            pictures = plotting.draw(pictured(tree), folder)
+            pictures = plotting.draw(pictured(tree), folder, figures=OWN_FIGURES)
         return write_report(tree, target, pictures, summary_of(tree))
 
 
@@ -290,7 +291,7 @@ def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most:
     ]
     long_name = str(state.attrs.get("long_name", name))
     data = {"axes": axes, "pictures": pictures, "alternatives": alternatives}
-    signature = group_of(tree, "domains/signature")
+    signature = group_of(tree, SIGNATURE)
     own = None
     if name == "state" and signature is not None and set(signature["gap_size"].dims) == set(dims):
         own = _signature_view(tree, signature.isel(shown).transpose(*dims, ...))
@@ -333,7 +334,7 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
     window = across(np.array([signature[name].values for name in ("window_low", "window_high")]))
     decades = 10.0 ** np.arange(-3, 6)[:, None] * (1.0, 2.0, 5.0)
     written = [value for value in decades.ravel() if side[0] <= value * scale.factor <= side[-1]]
-    rows = table_of(replace(_domain_rows.signature, first_dim=False), tree, signature)
+    rows = table_of(replace(SIGNATURE_TABLE, first_dim=False), tree, signature)
     cells = [list(zip(rows.heads, row, strict=True)) for row in rows.cells] if rows else []
     return {
         "curves": polylines(local),

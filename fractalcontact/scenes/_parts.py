@@ -25,19 +25,11 @@ from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._functions import parameters_of, public_function
-from fractalcontact.scenes._inputs import read_surface
-from fractalcontact.scenes._options import call_options, crack_options, stage_options
+from fractalcontact.scenes._domain_stages import SIGNATURE
+from fractalcontact.scenes._inputs import call_options, crack_options, read_surface, stage_options
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stages import (
-    CONTACT_MAPS,
-    SIGNATURE,
-    STAGES,
-    Stage,
-    StageType,
-    only_describes_surface,
-    section_length,
-)
+from fractalcontact.scenes._stage_type import CONTACT_MAPS, StageType, parameters_of, public_function
+from fractalcontact.scenes._stages import STAGES, Stage, only_describes_surface, section_length
 from fractalcontact.scenes._validation import require_above, validate_placed
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._functions import public_function
 from fractalcontact.scenes._parts import concatenate
+from fractalcontact.scenes._stage_type import public_function
 
 WHERE = "fractalcontact.scenes.reproduce"
 PACKAGE = "fractalcontact"

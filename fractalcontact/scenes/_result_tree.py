@@ -1,21 +1,38 @@
-"""The results of a study as a tree: the groups, and in its root what it is from and what is missing."""
+"""The results of a study as a tree: the groups, and in its root main numbers, sources and what is missing.
+
+Of many scans there is a row for each, the means with their intervals, and the outliers.
+"""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance, schema
-from fractalcontact.base.study import joined_references, provenance_of
-from fractalcontact.scenes._overview import main_results
+from fractalcontact.base.regression import is_far, random_effects
+from fractalcontact.base.study import MEMBER, group_of, joined_references, provenance_of
+from fractalcontact.scenes._joint_stages import JRC_COLUMN
+from fractalcontact.scenes._result_tables import (
+    SCAN,
+    Column,
+    ResultTable,
+    Rows,
+    amount,
+    column_scale,
+    plain,
+    table_of,
+)
 from fractalcontact.scenes._scene import Scene
-from fractalcontact.scenes._study import StudyResults
+
+if TYPE_CHECKING:
+    from fractalcontact.scenes._study import StudyResults
 
 OWN_REFERENCES = "see the references of each group"
 PARTIAL = "partial: "  # start of the attribute `completeness`
@@ -23,9 +40,8 @@ PARTIAL = "partial: "  # start of the attribute `completeness`
 
 def result_tree(scene: Scene, study: StudyResults, main: xr.Dataset | None = None) -> xr.DataTree:
     """Return the finished results as a tree that states what is missing; in its root the `main` ones."""
-    groups = {"/": main_results(study.groups) if main is None else main} | {
-        f"/{name}": result for name, result in study.groups.items()
-    }
+    own = in_words(main_results(study.groups), with_group=True) if main is None else main
+    groups = {"/": own} | {f"/{name}": result for name, result in study.groups.items()}
     description = groups.pop("/surfaces/description", None)
     if description is not None:
         heights = groups.get("/surfaces", xr.Dataset())
@@ -111,3 +127,167 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
         facts["interpolation error (m)"] = float(result["interpolation_error"].max())
     words = provenance_of(result).get("achieved_error")
     return facts if facts or words is None else {"error": words}
+
+
+OVERVIEW = "overview"  # group: a row for every scan
+ERROR = "standard_error"  # of the fractal dimension
+JRC, DIMENSION = "roughness_coefficient", "fractal_dimension"
+
+
+@dataclass(frozen=True)
+class Main:
+    """A number that stands for a study: the column of a table of scans, and the groups that have it.
+
+    The last of the groups counts. `beside` are further variables of the group that go with it.
+    """
+
+    column: Column
+    name: str
+    groups: tuple[str, ...]
+    beside: tuple[str, ...] = ()
+
+
+def _main(head: str, name: str, decimals: int | None, *groups: str, beside: tuple[str, ...] = ()) -> Main:
+    return Main(Column(head, name, decimals), name, groups, beside)
+
+
+ENDS = (f"{DIMENSION}_low", f"{DIMENSION}_high")
+MAIN = (
+    _main("dimension D", DIMENSION, 3, "dimensions", beside=(*ENDS, ERROR)),
+    Main(JRC_COLUMN, JRC, ("joints/roughness_coefficient",)),
+    _main("Sq", "rms_height", None, "surfaces", "surfaces/description"),  # in a file they are one group
+    _main("largest contact area", "contact_fraction", None, "contact", "joints/closure"),
+    _main("largest closure", "interface_closure", None, "joints/closure"),
+    _main("largest dilatancy", "rigid_dilatancy", None, "joints/rigid_dilatancy"),
+    _main("largest strength", "peak_shear_strength", None, "joints/friction", "joints/direct_shear"),
+)
+_COLUMNS = [entry.column for entry in MAIN]
+_ROWS = Rows(
+    "scans", (SCAN,),
+    (_COLUMNS[0], Column("95 % interval", ENDS, 3), *_COLUMNS[1:], Column("why it failed", "reason")),
+)  # fmt: skip
+
+
+def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return the numbers that stand for a study: dimensions of the first method, else the largest values.
+
+    Of an ensemble they are means over the members. The attributes `over` and `group` are the dims over which
+    each is the largest and the group that it is from; `in_words` puts them into the names.
+    """
+    main: dict[str, xr.DataArray] = {}
+    for entry in MAIN:
+        for group in (group for group in entry.groups if group in results):
+            result = results[group]
+            for name in (name for name in (entry.name, *entry.beside) if name in result):
+                values = result[name].isel(method=0, drop=True) if "method" in result.dims else result[name]
+                others = [str(dim) for dim in values.dims if dim != MEMBER]
+                number = values.max(others).mean() if others else values.mean()
+                attributes = {"long_name": name} | values.attrs | {"over": others, "group": group}
+                main[name] = number.drop_vars(number.coords).assign_attrs(attributes)
+    return xr.Dataset(main)
+
+
+def in_words(main: xr.Dataset, *, with_group: bool) -> xr.Dataset:
+    """Return main results whose names say over which dims they are the largest, and of which group."""
+    described = main.copy()
+    for values in described.data_vars.values():
+        over, group = values.attrs.pop("over"), values.attrs.pop("group")
+        largest = f": the largest over {', '.join(over)}" if over else ""
+        values.attrs["long_name"] += largest + (f", of the group {group}" if with_group else "")
+    return described
+
+
+def pictured(tree: xr.DataTree) -> xr.DataTree:
+    """Return the groups of a study that figures show: of many scans the overview alone."""
+    if OVERVIEW not in tree.children:
+        return tree
+    return xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
+
+
+def pooled(main: xr.Dataset) -> xr.Dataset:
+    """Return the mean of every main result over the scans, its interval, and the scatter between scans.
+
+    JRC below its scale is extrapolated, to -40 on a smooth face: it is left out.
+    """
+    means: dict[str, tuple[tuple[()], float, dict[str, str]]] = {}
+    for key, values in main.data_vars.items():
+        if str(key).endswith(("_low", "_high")) or key == ERROR:
+            continue
+        if key == JRC:
+            values = values.where(values >= 0)
+        has_errors = key == DIMENSION and ERROR in main and main[ERROR].notnull().any()
+        errors = main[ERROR].values if has_errors else 0.0
+        found = random_effects(values.values, errors)
+        # D lies between two whole numbers; what is negative in no scan is so in no mean
+        is_dimension, smallest = key == DIMENSION, float(values.min())
+        least = float(np.floor(smallest)) if is_dimension else 0.0 if smallest >= 0.0 else -np.inf
+        low, high = np.clip((found.low, found.high), least, least + 1.0 if is_dimension else np.inf)
+        text = f"{values.attrs['long_name']}: "
+        facts = {
+            "": (found.mean, f"mean over {found.count} scans (random effects)"),
+            "_low": (float(low), "lower end of the 95 % interval of the mean over scans"),
+            "_high": (float(high), "upper end of the 95 % interval of the mean over scans"),
+            "_scatter": (found.between, "standard deviation between scans, without the error within each"),
+            "_scans": (float(found.count), "number of scans that have a value"),
+        }
+        for ending, (value, words) in facts.items():
+            units = "1" if ending == "_scans" else values.attrs["units"]
+            means[f"{key}{ending}"] = ((), value, {"units": units, "long_name": text + words})
+    return xr.Dataset(means)
+
+
+def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
+    """Yield the means over the scans and a row for every scan; nothing for a study of one surface."""
+    overview, root = group_of(tree, OVERVIEW), tree.to_dataset(inherit=False)
+    if overview is None:
+        return
+    keys, cells = [], []
+    for entry in MAIN:
+        head, decimals, name = entry.column.head, entry.column.decimals, entry.name
+        if name not in root:
+            continue
+        scale = column_scale(root[name])
+        mean, low, high, scatter = (
+            amount(each, scale=scale) if decimals is None else plain(each, decimals)
+            for each in (root[f"{name}{end}"].rename(name) for end in ("", "_low", "_high", "_scatter"))
+        )
+        keys.append((head,))
+        count = plain(root[f"{name}_scans"], 0)
+        cells.append((mean, "none" if low == "-" else f"{low} to {high}", scatter, count))
+    heads = ("mean", "95 % interval", "scatter between scans", "scans")
+    yield ResultTable("means over the scans", ("quantity",), tuple(keys), heads, tuple(cells))
+    has_failed = bool((overview["status"] != "done").any())
+    rows = _ROWS if has_failed else replace(_ROWS, columns=_ROWS.columns[:-1])
+    table = table_of(rows, tree, overview)
+    if table is not None:
+        yield table
+
+
+def scan_facts(tree: xr.DataTree) -> Iterator[str]:
+    """Yield how many scans there are and which failed, are outliers, or have caveats."""
+    overview = group_of(tree, OVERVIEW)
+    if overview is None:
+        return
+    names = overview[SCAN].values.astype(str)
+    counts = [f"{names.size} scans"]
+    for status in ("failed", "incomplete"):
+        chosen = names[overview["status"].values == status]
+        counts += [f"{chosen.size} {status}: {_few(chosen)}"] if chosen.size else []
+    yield "; ".join(counts)
+    if JRC in overview and (overview[JRC] < 0).any():
+        chosen = names[overview[JRC].values < 0]
+        yield f"JRC is below 0, beyond its scale, and left out of the mean: {_few(chosen)}"
+    found = {each.column.head: is_far(overview[each.name].values) for each in MAIN if each.name in overview}
+    texts = [f"{head} of {_few(names[is_one])}" for head, is_one in found.items() if is_one.any()]
+    if texts:
+        yield f"outliers: {'; '.join(texts)}"
+    caveats = [name for name, text in zip(names, overview["caveats"].values, strict=True) if text]
+    if caveats:
+        yield f"scans with caveats, which their pages state: {_few(caveats)}"
+
+
+def _few(names: object, most: int = 3) -> str:
+    """Return the first names, at most `most`, and how many more there are."""
+    words = [str(name) for name in names]  # type: ignore[attr-defined]
+    more = f" and {len(words) - most} more" if len(words) > most else ""
+    return ", ".join(words[:most]) + more

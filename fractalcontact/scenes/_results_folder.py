@@ -1,27 +1,60 @@
-"""The folder of a study: recognised by what the package wrote in it; anything else is never touched.
+"""The folder of a study: its results, and the finished parts by which a stopped study resumes.
 
-A result file states the scene that it is from, a report and a figure the program that wrote them.
+It is recognised by what the package wrote in it; anything else is never touched. A result file states the
+scene that it is from, a report and a figure the program that wrote them.
+
+A part is one NumPy `.npz` file, written under a temporary name and renamed when it is complete; the
+archive has a checksum of each array. It is not NetCDF: on a dask worker every access of a NetCDF file takes a
+lock of the whole cluster (8 members of 128 x 128 points: 3592 acquisitions, 26.6 s instead of 9.8 s).
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
+import secrets
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import warnings
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import IO, TYPE_CHECKING, Any
 
-from fractalcontact.base.errors import FractalContactError, UnreadableFile
+import numpy as np
+import xarray as xr
+
+import fractalcontact
+from fractalcontact.base.errors import (
+    FractalContactError,
+    FractalContactWarning,
+    InvalidInput,
+    UnreadableFile,
+)
 from fractalcontact.base.file_contents import read_headers
-from fractalcontact.base.files import PARTIAL_RESULT, RESULT, WHERE, output_folder
+from fractalcontact.base.files import (
+    PARTIAL_RESULT,
+    RESULT,
+    WHERE,
+    clear_partial,
+    output_folder,
+    written_whole,
+)
+from fractalcontact.base.provenance import with_load_indexes
+from fractalcontact.base.schema import encoded
 from fractalcontact.base.signals import Stopped
 from fractalcontact.base.study import scene_of
 from fractalcontact.base.validation import Problems, Words
-from fractalcontact.scenes._checkpoint import FOLDER
+from fractalcontact.scenes._inputs import crack_options, locate, stage_options
 from fractalcontact.scenes._scene import Scene
 
+if TYPE_CHECKING:
+    from fractalcontact.scenes._stages import Stage
+
 REPORT, DATASHEET, TABLES, CSV = "report.html", "datasheet.pdf", "tables", "scans.csv"
+SCANS = "scans"  # folder and group of the single scans
 GENERATOR = 'name="generator" content="fractalcontact'  # of a report, in its head
 SOFTWARE = "fractalcontact"  # of a figure, as its metadata say
 REMEDY = "choose another folder, or --force to overwrite"
@@ -53,6 +86,16 @@ def results_folder(out: str | os.PathLike[str] | None, scene: Scene, *, force: b
         if is_new and not kept and not isinstance(error, Stopped):
             shutil.rmtree(folder, ignore_errors=True)
         raise
+
+
+def folder_of(name: str) -> str:
+    """Return the name of the folder and the group of a scan; those of two scans differ."""
+    return name.replace("%", "%25").replace("/", "%2F")
+
+
+def page_of(name: str) -> str:
+    """Return where the report of a scan lies, from that of all."""
+    return f"{SCANS}/{folder_of(name)}/{REPORT}"
 
 
 def _check(folder: Path, scene: Scene, problems: Problems) -> None:
@@ -131,3 +174,170 @@ def _identity(tables: Mapping[str, Any]) -> list[Any]:
 def _source(value: Any) -> str:
     """Return the name of a file, or of the folder of a list of scans, which may grow."""
     return Path(str(value[0])).parent.name if isinstance(value, list) and value else Path(str(value)).name
+
+
+FOLDER = ".stages"
+_HEADER, _ARRAY = "header", "array"
+_DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
+
+
+class PartStore:
+    """Results of finished parts by name, in the folder of a run; without a folder it keeps nothing."""
+
+    def __init__(self, out: Path | None) -> None:
+        self.folder = None if out is None else out.absolute() / FOLDER
+
+    def get(self, key: str) -> xr.Dataset | None:
+        """Return the result that was kept under a name; None if there is none, or a damaged one."""
+        if self.folder is None or not (path := self.folder / f"{key}.npz").is_file():
+            return None
+        try:
+            return _read_part(path)
+        except _DAMAGED:
+            message = f"{FOLDER}/{path.name} is damaged or of another origin; that part is computed again"
+            warnings.warn(message, FractalContactWarning, stacklevel=2)
+            return None
+
+    def put(self, key: str, result: xr.Dataset) -> None:
+        """Keep a result."""
+        if self.folder is not None:
+            _write_part(result, self.folder / f"{key}.npz")
+
+    def kept(self, digests: Iterable[str]) -> dict[str, xr.Dataset]:
+        """Return what was kept of the stages with these digests, by name."""
+        if self.folder is None:
+            return {}
+        names = [path.stem for digest in digests for path in self.folder.glob(f"*.{digest}.*.npz")]
+        parts = {name: self.get(name) for name in names}
+        return {name: part for name, part in parts.items() if part is not None}
+
+    def clear(self) -> None:
+        """Remove all that is kept, and no file of others."""
+        if self.folder is None:
+            return
+        with suppress(OSError):  # a file that cannot be removed, or another one in the folder
+            for path in (*self.folder.glob("*.npz*"), *self.folder.glob("run-*")):  # parts, and marks of runs
+                path.unlink()
+            self.folder.rmdir()
+
+
+class MemoryStore(PartStore):
+    """The store of a worker without access to the folder: kept parts are sent to it, new ones return."""
+
+    def __init__(self, kept: Mapping[str, xr.Dataset]) -> None:
+        super().__init__(None)
+        self.before: Mapping[str, xr.Dataset] = kept
+        self.added: dict[str, xr.Dataset] = {}
+
+    def get(self, key: str) -> xr.Dataset | None:
+        """Return the result that was kept under a name, None if there is none."""
+        return self.before.get(key)
+
+    def put(self, key: str, result: xr.Dataset) -> None:
+        """Keep a result."""
+        self.added[key] = result
+
+
+def _write_part(result: xr.Dataset, path: Path) -> None:
+    arrays: dict[str, np.ndarray[Any, Any]] = {}
+    parts = {"data_vars": result.data_vars, "coords": result.coords}
+    content: dict[str, Any] = {
+        place: {name: [list(each.dims), each.values, each.attrs] for name, each in variables.items()}
+        for place, variables in parts.items()
+    }
+    header = json.dumps(_plain(content | {"attrs": result.attrs}, arrays))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        clear_partial(path.parent)
+        with written_whole(path) as temporary, temporary.open("wb") as file:
+            _write_arrays(file, {_HEADER: np.array(header)} | arrays)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidInput(
+            "fractalcontact.scenes.run", [f"out: {path.name!r} cannot be written here: {reason}"]
+        ) from error
+
+
+def _write_arrays(file: IO[bytes], arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
+    """Write an npz file; unlike older `np.savez`, close the archive also where the disk is full."""
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, values in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, values)
+
+
+def _read_part(path: Path) -> xr.Dataset:
+    """Return a part; raise one of `_DAMAGED` if it is not as it was written."""
+    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+        arrays = {name: file[name] for name in file.files}  # the archive has a checksum of each
+    header = _restored(json.loads(str(arrays.pop(_HEADER))), arrays)
+    variables, coordinates = (
+        {name: tuple(each) for name, each in header[place].items()} for place in ("data_vars", "coords")
+    )
+    return with_load_indexes(encoded(xr.Dataset(variables, coordinates, header["attrs"])))
+
+
+def _plain(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
+    """Return a result as types of JSON; arrays and NumPy numbers go into `arrays`, which keeps their type."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item, arrays) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, arrays) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        name, values = f"array{len(arrays)}", np.asarray(value)
+        arrays[name] = values.astype(str) if values.dtype == object else values
+        return {_ARRAY: name}
+    return value
+
+
+def _restored(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
+    """Undo `_plain`."""
+    if isinstance(value, list):
+        return [_restored(item, arrays) for item in value]
+    if isinstance(value, dict) and _ARRAY in value:
+        return arrays[value[_ARRAY]][()]
+    return {key: _restored(item, arrays) for key, item in value.items()} if isinstance(value, dict) else value
+
+
+def with_seeds(scene: Scene, store: PartStore) -> Scene:
+    """Return the scene with a seed for each surface generated without one; a resumed run takes the same."""
+    names = [
+        name
+        for name in ("surface", "upper")
+        if "generate" in scene.table(name) and "rng" not in scene.table(name)
+    ]
+    if not names:
+        return scene
+    key = f"seeds.{digest_of(scene.tables)}"
+    kept = store.get(key)
+    if kept is None:
+        kept = xr.Dataset(attrs={name: str(secrets.randbits(48)) for name in names})
+        store.put(key, kept)
+    tables = {name: {**scene.table(name), "rng": int(kept.attrs[name])} for name in names}
+    return replace(scene, tables={**scene.tables, **tables})
+
+
+def digest(stage: Stage, scene: Scene, digests: Mapping[str, str]) -> str:
+    """Return a digest of all that can change the result of a stage, and of nothing else."""
+    row = stage.row
+    facts: dict[str, Any] = {
+        "version": fractalcontact.__version__,
+        "keep": [word for word in stage.keep if word not in stage.dropped],
+        "options": stage_options(scene, row),
+    }
+    if row.takes == "file":
+        facts["surface"] = table = scene.table("surface" if stage.name == "surfaces" else "upper")
+        facts["register"] = scene.joint.register, scene.joint.turn_upper
+        if "read" in table:
+            file = locate(table["read"], scene.folder)
+            facts["file"] = hashlib.sha256(file.read_bytes()).hexdigest()
+    if row.takes == "crack":
+        facts["crack"] = crack_options(scene, row)
+    facts["needs"] = [digests[need] for need in stage.needs]
+    return digest_of([stage.name, facts])
+
+
+def digest_of(facts: Any) -> str:
+    """Return a short digest of plain values."""
+    text = json.dumps(facts, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -26,23 +26,19 @@ from fractalcontact.base.study import of_member, provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
 from fractalcontact.scenes._caveats import caveats
-from fractalcontact.scenes._checkpoint import PartStore, with_seeds
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
+from fractalcontact.scenes._export import tables
 from fractalcontact.scenes._html_report import page_contents, write_report
 from fractalcontact.scenes._inputs import read_surface
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, pictured, pooled
-from fractalcontact.scenes._plan import stages_of
-from fractalcontact.scenes._plausibility import implausible_result, warn
-from fractalcontact.scenes._result_tree import note_run_time, result_tree
-from fractalcontact.scenes._scan_files import scans_of
+from fractalcontact.scenes._result_tree import OVERVIEW, note_run_time, pictured, pooled, result_tree
+from fractalcontact.scenes._results_folder import SCANS, PartStore, with_seeds
 from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene
-from fractalcontact.scenes._stage_memory import check_memory
-from fractalcontact.scenes._stages import FIGURES
+from fractalcontact.scenes._scene_file import scans_of
+from fractalcontact.scenes._stages import FIGURES, OWN_FIGURES, check_memory, stages_of
 from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
-from fractalcontact.scenes._tables import tables
-from fractalcontact.scenes._validation import validated
+from fractalcontact.scenes._validation import implausible_result, validated, warn
 
 
 def run(
@@ -159,7 +155,7 @@ def _run_scans(
                 done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
                 raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
             groups = studies.groups()
-            tree = result_tree(scene, StudyResults(groups, studies.seconds), pooled(groups[OVERVIEW]))
+            tree = result_tree(scene, StudyResults(groups, studies.seconds), pooled(studies.main()))
             note_run_time(tree, start)
             tree.attrs["caveats"] = "none"
             together.add(tree)
@@ -315,7 +311,7 @@ def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:
     from fractalcontact import plotting
 
     start = time.perf_counter()
-    files = plotting.draw(tree, folder, progress=progress)
+    files = plotting.draw(tree, folder, progress=progress, figures=OWN_FIGURES)
     entry = provenance_of(tree)
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base import signals
@@ -22,16 +23,13 @@ from fractalcontact.base.netcdf import open as open_result
 from fractalcontact.base.schema import label
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import provenance_of
-from fractalcontact.scenes._checkpoint import PartStore, digest_of
 from fractalcontact.scenes._executor import Workers, run_tasks
-from fractalcontact.scenes._overview import OVERVIEW, SCANS, folder_of
+from fractalcontact.scenes._export import MAP_DIMS
 from fractalcontact.scenes._result_tables import SCAN
-from fractalcontact.scenes._result_tree import PARTIAL
-from fractalcontact.scenes._results_folder import REPORT
+from fractalcontact.scenes._result_tree import OVERVIEW, PARTIAL, in_words, main_results
+from fractalcontact.scenes._results_folder import REPORT, SCANS, PartStore, digest_of, folder_of
 from fractalcontact.scenes._scene import Scene
-from fractalcontact.scenes._stacked_results import stacked
-from fractalcontact.scenes._study import Study, reason_of
-from fractalcontact.scenes._tables import MAP_DIMS
+from fractalcontact.scenes._study import Study, reason_of, stacked
 
 DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
 NO_ACCESS = "the worker does not see the folder of the results"
@@ -174,17 +172,20 @@ class ScanStudies:
                 groups[path] = stacked(having, SCAN)
         return groups
 
+    def main(self) -> xr.Dataset:
+        """Return the main results of all scans, NaN where a scan has none."""
+        mains = {name: main_results(groups) for name, groups in self.numbers.items()}
+        table = xr.Dataset(coords={SCAN: list(self.reasons)})
+        for key in dict.fromkeys(key for main in mains.values() for key in main.data_vars):
+            found = {name: main[key] for name, main in mains.items() if key in main}
+            values = [float(found.get(name, np.nan)) for name in self.reasons]
+            table[key] = (SCAN, values, next(iter(found.values())).attrs)
+        return table
+
     def _overview(self) -> xr.Dataset:
         """Return a row for every scan: what stands for its study, whether it failed, and why."""
         names, roots = list(self.reasons), {name: each[""] for name, each in self.numbers.items()}
-        table = xr.Dataset(coords={SCAN: names})
-        for key in dict.fromkeys(key for root in roots.values() for key in root.data_vars):
-            values = [
-                float(roots[name].get(key, float("nan"))) if name in roots else float("nan") for name in names
-            ]
-            attributes = dict(next(root[key].attrs for root in roots.values() if key in root))
-            attributes["long_name"] = attributes["long_name"].partition(", of the group")[0]
-            table[key] = (SCAN, values, attributes)
+        table = in_words(self.main(), with_group=False)
         table["status"] = (
             SCAN,
             [

@@ -1,306 +1,53 @@
-"""The stages of a study as one static table: what each needs, its public function, its maps, its rows.
+"""The stages of a study: the table of all, the plan of those that a scene needs, and the memory of each.
 
-The rows stand in an order in which they can run. `_plan` selects those that the wanted results of a scene
-need, `_options` gives the arguments of their calls, `_parts` carries them out. The tables of their results
-are in `_surface_rows`, `_joint_rows` and `_domain_rows`.
+The rows of the table stand in an order in which they can run; `_inputs` gives the arguments of their calls,
+and `_parts` carries them out. At its peak a stage holds the libraries loaded so far, the surfaces, the maps
+that earlier stages keep, and what the call of its public function takes (see `base.resources`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
-from fractalcontact.scenes import _domain_rows as of_domain
-from fractalcontact.scenes import _joint_rows as of_joint
-from fractalcontact.scenes import _surface_rows as of_surface
-from fractalcontact.scenes._functions import arguments_of, parameters_of
-from fractalcontact.scenes._result_tables import Rows
-from fractalcontact.scenes._scene import LOADS, PRESS, Scene
+import numpy as np
 
-CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
-SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
-PARTIAL_SLIP, SIGNATURE = "partial_slip", "domains/signature"
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.resources import Plane, bytes_on, map_bytes, require_memory
+from fractalcontact.base.tables import screen_width, table
+from fractalcontact.base.validation import Problems
+from fractalcontact.scenes import _domain_stages, _joint_stages, _surface_stages
+from fractalcontact.scenes._inputs import (
+    block_shape,
+    call_options,
+    generator_options,
+    surface_grid,
+    values_of,
+)
+from fractalcontact.scenes._scene import LOADS, Scene
+from fractalcontact.scenes._stage_type import (
+    CONTACT_MAPS,
+    ISLAND_MAP,
+    SLIP_MAPS,
+    StageType,
+    arguments_of,
+    public_function,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 FIGURES = "figures"
 PART_SIZE = 1 << 23  # nodes times steps of one part: seconds of work, and maps of at most 64 MB each
-
-
-@dataclass(frozen=True)
-class StageType:
-    """One row of the table of stages.
-
-    Attributes
-    ----------
-    name : str
-        Group of its result, "joints/closure" for example.
-    needs : tuple of str
-        Stages whose results it takes, where the study has them; of "a or b" the first that the study has. A
-        stage that takes a map or a result brings the last of its first need into the study, if it has none.
-    function : str
-        The public function that computes it, for example "joints.closure".
-    table : str
-        Table of the scene with the arguments of the function.
-    wanted : str
-        List and word of `[want]` that ask for it, "joints.closure" for example.
-    takes : {"surface", "crack", "map", "result", "file", "study"}
-        The first argument of the function: the lower face, the crack, a map or the whole result of the stage
-        it needs, a file of the scene, or all results.
-    why : str
-        Why it needs another stage, for the plan.
-    for_figures : bool
-        It is computed only where figures are wanted.
-    reads : str
-        The map that it reads from the stage it needs.
-    keeps : tuple of str
-        The maps that it can store.
-    splits : tuple of str
-        Arguments whose values are computed apart, each by a call of its own (a part of the stage) that may
-        run anywhere; "step" is the path of the load, cut into sections.
-    rows : Rows, optional
-        The table of its result in the summary and the report.
-    whole_path : bool
-        It follows the contact set along the load path, or measures all states over one window of lengths, and
-        reads the maps of all steps at once. A scene can ask that of other stages too, see `Stage.whole_path`.
-    presses : bool
-        It solves a contact: it needs elastic constants, and which loads are possible depends on the heights.
-    may_be_rigid, refuses_hardness : bool
-        It computes rigid faces where the material has no elastic constants; it knows elastic bodies alone.
-    one_load, one_direction : bool
-        It takes one path of load, one direction.
-    keys, own : tuple of str
-        The arguments that a scene may give, where they are not all of the function; and those of them that
-        only its own table gives.
-    required : tuple of str
-        Arguments that a scene must give beside those without a default.
-    fixed : mapping
-        Arguments that no scene gives.
-    """
-
-    name: str
-    needs: tuple[str, ...]
-    function: str
-    table: str = ""
-    wanted: str = ""
-    takes: Literal["surface", "crack", "map", "result", "file", "study"] = "surface"
-    why: str = ""
-    for_figures: bool = False
-    reads: str = ""
-    keeps: tuple[str, ...] = ()
-    splits: tuple[str, ...] = ()
-    rows: Rows | None = None
-    whole_path: bool = False
-    presses: bool = False
-    may_be_rigid: bool = False
-    refuses_hardness: bool = False
-    one_load: bool = False
-    one_direction: bool = False
-    keys: tuple[str, ...] = ()
-    own: tuple[str, ...] = ()
-    required: tuple[str, ...] = ()
-    fixed: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def subpackage(self) -> str:
-        """The subpackage that holds the function."""
-        return self.function.partition(".")[0]
-
-    @property
-    def group(self) -> str:
-        """The group of the result in which it stands, "joints" for example."""
-        return self.name.partition("/")[0]
-
-    @property
-    def word(self) -> str:
-        """The name without its group."""
-        return self.name.partition("/")[2]
-
-    def arguments(self) -> tuple[str, ...]:
-        """Return the arguments of the function that a scene may give."""
-        return self.keys or arguments_of(self.function)[0]
-
-    def needed(self) -> tuple[str, ...]:
-        """Return the arguments that a scene must give."""
-        without_default = arguments_of(self.function)[1]
-        known = self.keys or parameters_of(self.function)
-        return (*self.required, *(key for key in known if key in without_default))
-
-
-_SURFACE = ("surfaces",)
-_FACES = ("surfaces", "joints/faces")
-
-
-def _curve(method: str) -> StageType:
-    name = f"dimensions.{method}"
-    return StageType(f"dimensions/{method}", _SURFACE, name, wanted=name, for_figures=True)
-
-
-def _joint(
-    name: str, rows: Rows | None, needs: tuple[str, ...] = _FACES, function: str = "", **more: Any
-) -> StageType:
-    options: dict[str, Any] = {"takes": "crack"} | more
-    function = f"joints.{function or name}"
-    return StageType(
-        f"joints/{name}", needs, function, f"joint.{name}", f"joints.{name}", rows=rows, **options
-    )
-
-
-def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
-    return _joint(name, rows, _SURFACE, takes="surface", **more)
-
-
-def _of_gap(name: str, rows: Rows) -> StageType:
-    return _joint(name, rows, ("joints/closure",), takes="map", reads="gap", why=f"{name} needs the gap")
-
-
-def _domain(name: str, rows: Rows | None = None, needs: tuple[str, ...] = (), **more: Any) -> StageType:
-    source = ("contact or joints/closure", *needs)
-    table, why = f"domains.{name}", "the contact set is analysed"
-    return StageType(
-        f"domains/{name}", source, table, table, table, "map", why, reads="state", rows=rows, **more
-    )
-
-
-_ONE: dict[str, Any] = {"one_load": True, "one_direction": True}
 _ROWS = (
-    StageType(
-        "surfaces",
-        (),
-        "surfaces.read",
-        "surface",
-        "surfaces.height",
-        takes="file",
-        rows=of_surface.surfaces,
-    ),  # with its description
-    StageType("surfaces/description", _SURFACE, "surfaces.describe", wanted="surfaces.describe"),
-    StageType(
-        "surfaces/texture",
-        _SURFACE,
-        "surfaces.texture",
-        wanted="surfaces.texture",
-        rows=of_surface.texture,
-    ),
-    StageType("dimensions", _SURFACE, "dimensions.estimate", "dimensions", rows=of_surface.dimensions),
-    _curve("spectrum"),
-    _curve("variogram"),
-    _curve("cube_counts"),
-    _curve("roughness_length"),
-    _curve("variation"),
-    _curve("higuchi"),
-    _curve("detrended_fluctuation"),
-    _curve("divider"),
-    _curve("covering"),
-    StageType(
-        "contact",
-        _SURFACE,
-        "contact.press",
-        "contact",
-        f"contact.{PRESS}",
-        keeps=CONTACT_MAPS,
-        splits=("step",),
-        presses=True,
-        one_load=True,
-        rows=of_surface.contact,
-    ),
-    # not below contact: its steps are others than those of the load path
-    StageType(
-        PARTIAL_SLIP,
-        _SURFACE,
-        "contact.partial_slip",
-        "contact.partial_slip",
-        f"contact.{PARTIAL_SLIP}",
-        keeps=SLIP_MAPS,
-        presses=True,
-        refuses_hardness=True,
-        one_load=True,
-        rows=of_surface.partial_slip,
-    ),
-    StageType("joints/faces", _SURFACE, "joints.register", "upper", takes="file", rows=of_joint.faces),
-    _joint("delta_surface", None, one_direction=True),
-    _joint("delta_dimension", of_joint.delta_dimension, one_direction=True),
-    _joint("rigid_dilatancy", of_joint.rigid_dilatancy, function="dilatancy", keys=("shear", "direction")),
-    _joint("closure", of_joint.closure, keeps=CONTACT_MAPS, splits=("shear", "step"), presses=True, **_ONE),
-    _joint(
-        "closure_laws",
-        of_joint.closure_laws,
-        ("joints/closure",),
-        takes="result",
-        why="closure_laws needs it",
-        keys=("seating_pressure",),  # its closure is the result of another stage, not a load
-    ),
-    _joint(
-        "elimination",
-        of_joint.elimination,
-        function="closure",
-        splits=("shear", "step"),
-        presses=True,
-        # of a part of the block, and elastic
-        keys=("block", "shear", "direction", *LOADS, "bulk", "influence", "disc_radius", "tolerance"),
-        required=("block",),
-        fixed={"method": "elimination"},
-        **_ONE,
-    ),
-    _joint("area_dimension", of_joint.area_dimension, splits=("shear",), presses=True, **_ONE),
-    _joint(
-        PARTIAL_SLIP,
-        of_surface.partial_slip,
-        keeps=SLIP_MAPS,
-        splits=("shear",),
-        presses=True,
-        refuses_hardness=True,
-        **_ONE,
-    ),
-    _joint(
-        "elastic_dilatancy",
-        of_joint.elastic_dilatancy,
-        (*_FACES, "joints/closure"),
-        function="dilatancy",
-        splits=("direction", "shear"),
-        required=("normal_force",),
-        presses=True,
-    ),
-    _joint(
-        "friction",
-        of_joint.friction,
-        ("joints/elastic_dilatancy or joints/rigid_dilatancy",),
-        takes="result",
-        why="friction needs a dilatancy",
-        own=("nominal_pressure",),  # in [joint] it is the load of the closure
-    ),
-    _of_surface("roughness_coefficient", of_joint.roughness_coefficient),
-    _of_surface("directional_roughness", of_joint.directional_roughness),
-    _joint(
-        "direct_shear",
-        of_joint.direct_shear,
-        splits=("nominal_pressure",),
-        one_direction=True,
-        presses=True,
-    ),
-    _of_surface("shear_curve", of_joint.shear_curve, one_direction=True),
-    _of_surface("strength_envelope", of_joint.strength_envelope, one_direction=True),
-    _joint("self_weight", of_joint.self_weight, presses=True, may_be_rigid=True),
-    _joint("decorrelation_length", of_joint.decorrelation_length, one_direction=True),
-    _of_gap("transmissivity", of_joint.transmissivity),
-    _of_gap("uplift", of_joint.uplift),
-    # one window of lengths for all states
-    _domain("signature", of_domain.signature, whole_path=True),
-    _domain("box_dimension", of_domain.box_dimension, whole_path=True),
-    _domain("box_counts"),
-    _domain("minkowski_dimension", of_domain.minkowski_dimension),
-    _domain("correlation_dimension", of_domain.correlation_dimension),
-    _domain("generalised_dimensions", of_domain.generalised_dimensions),
-    _domain("boundary_dimension", of_domain.boundary_dimension),
-    _domain("lacunarity", of_domain.lacunarity),
-    _domain("islands", of_domain.islands, keeps=(ISLAND_MAP,), whole_path=True),
-    _domain("percolation", of_domain.percolation),
-    _domain("hausdorff_content"),
-    _domain("describe", of_domain.describe, whole_path=True),
-    _domain("evolution", of_domain.evolution, (SIGNATURE,), whole_path=True),
-    _domain("lineage", whole_path=True),
+    *_surface_stages.STAGES,
+    *_joint_stages.STAGES,
+    *_domain_stages.STAGES,
     StageType(FIGURES, (), "plotting.draw", takes="study"),
 )
 STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}
-
-
+OWN_FIGURES = {row.name: row.figure for row in _ROWS if row.figure is not None}
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
     name: tuple(word for table, _, word in (row.wanted.partition(".") for row in _ROWS) if table == name)
@@ -365,3 +112,231 @@ def only_describes_surface(scene: Scene) -> bool:
     """Return whether the study presses nothing, and describes the surface alone."""
     of_crack = [name for name in scene.want.joints if STAGES[f"joints/{name}"].takes != "surface"]
     return not (scene.want.contact or scene.want.domains or of_crack)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The stages of a scene in an order in which they can run; prints as a table.
+
+    Attributes
+    ----------
+    scene : str
+        Name of the scene.
+    stages : tuple of Stage
+    memory : mapping
+        Estimated peak memory of each stage in bytes, libraries and earlier results included; empty where the
+        size of the surface is not known.
+    """
+
+    scene: str
+    stages: tuple[Stage, ...] = field(default=())
+    memory: Mapping[str, float] = field(default_factory=dict)
+
+    def __iter__(self) -> Iterator[Stage]:
+        """Iterate over the stages in order."""
+        return iter(self.stages)
+
+    def __len__(self) -> int:
+        """Return the number of stages."""
+        return len(self.stages)
+
+    def __str__(self) -> str:
+        """Return a table: stage, stages it needs, reason, and peak memory where the screen is wide enough."""
+        rows: list[tuple[str, ...]] = [("stage", "needs", "reason", "peak memory")]
+        for stage in self:
+            needs = "all stored results" if stage.row.takes == "study" else ", ".join(stage.needs)
+            name = stage.name + ("" if stage.stored else " (not stored)")
+            peak = f"{self.memory[stage.name] / 1e6:.0f} MB" if stage.name in self.memory else "unknown"
+            rows.append((name, needs, stage.reason, peak))
+        notes = []
+        if screen_width() < 80:  # characters: too narrow for the column of memory
+            rows = [row[:-1] for row in rows]
+            largest = max(self.memory, key=lambda name: self.memory[name], default="")
+            notes += [f"peak memory: {self.memory[largest] / 1e6:.0f} MB, {largest}"] if largest else []
+        return "\n".join([table(rows), *notes])
+
+
+def plan(scene: Scene) -> Plan:
+    """Return the stages that the wanted results of a scene need, and no others.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `fractalcontact.scenes.load`.
+
+    Returns
+    -------
+    Plan
+        Iterates over its stages; prints as a table, with the memory that each stage takes at its peak.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> for stage in fc.scenes.plan(fc.scenes.load("rigid_sliding")):
+    ...     print(stage.name, "-", stage.reason)
+    surfaces - input
+    joints/rigid_dilatancy - rigid_dilatancy is wanted
+    """
+    with Problems("fractalcontact.scenes.plan") as problems:
+        problems.require(isinstance(scene, Scene), "scene", "a Scene, from fractalcontact.scenes.load", scene)
+    stages = stages_of(scene)
+    return Plan(scene.name, stages, stage_memory(scene, stages))
+
+
+def stages_of(scene: Scene) -> tuple[Stage, ...]:
+    """Return the stages of a scene."""
+    reasons = _reasons(scene)
+    stages = [
+        Stage(
+            name,
+            _needs(row, reasons),
+            reasons[name],
+            stored=name != "surfaces" or reasons[name] != "input",
+            whole_path=row.whole_path or (row.takes == "map" and "total_stress" in values_of(scene, row)),
+        )
+        for name, row in STAGES.items()
+        if name in reasons
+    ]
+    stages = [_with_maps(stage, stages, scene) for stage in stages]
+    if scene.want.figures:
+        stored = tuple(stage.name for stage in stages if stage.stored)
+        stages.append(Stage(FIGURES, stored, "figures are wanted", stored=False))
+    return tuple(stages)
+
+
+def _with_maps(stage: Stage, stages: Sequence[Stage], scene: Scene) -> Stage:
+    """Return a stage with the maps that it has to return: those to store, and those that other stages read.
+
+    The result file has the maps that are wanted, and those that its figures show.
+    """
+    stored = {*scene.want.keep, *(("state", "slip_state", ISLAND_MAP) if scene.want.figures else ())}
+    readers = [other for other in stages if other.reads_map and stage.name in other.needs]
+    read = {reader.row.reads for reader in readers}
+    read_whole = {reader.row.reads for reader in readers if not reader.reads_part}
+    keep = tuple(name for name in stage.row.keeps if name in stored | read)
+    internal = tuple(name for name in keep if name not in stored)
+    return replace(
+        stage,
+        keep=keep,
+        internal=internal,
+        dropped=tuple(name for name in internal if name not in read_whole),
+    )
+
+
+def _reasons(scene: Scene) -> dict[str, str]:
+    """Return the names of the stages that the wanted results need, each with the reason."""
+    want = scene.want
+    reasons = {"surfaces": "figures are wanted" if want.figures else "input"}
+    if want.dimensions:
+        reasons["dimensions"] = f"wanted: {', '.join(want.dimensions)}"
+    for row in STAGES.values():
+        table, _, word = row.wanted.partition(".")
+        if word and word in getattr(want, table) and (want.figures or not row.for_figures):
+            reasons[row.name] = "figures are wanted" if row.for_figures else f"{word} is wanted"
+    # from the last stage to the first, so that what a needed one needs is there too
+    for row in reversed(tuple(STAGES.values())):
+        for need in row.needs[:1] if row.name in reasons and row.takes in ("map", "result") else ():
+            *_, last = names = need.split(" or ")
+            if reasons.keys().isdisjoint(names):
+                reasons[last] = row.why
+    if any(STAGES[name].group == "joints" for name in reasons):
+        if want.figures and "shear" in values_of(scene, STAGES["joints/delta_surface"]):
+            reasons.setdefault("joints/delta_surface", "figures are wanted")
+        if scene.upper is not None:
+            registered = " and registered" if scene.joint.register else ""
+            reasons["joints/faces"] = f"an upper face is given{registered}"
+    return reasons
+
+
+def _needs(row: StageType, planned: dict[str, str]) -> tuple[str, ...]:
+    """Return the stages that a row needs, as far as the plan has them."""
+    alternatives = (need.split(" or ") for need in row.needs)
+    first = (next((name for name in names if name in planned), None) for names in alternatives)
+    return tuple(name for name in first if name is not None)
+
+
+# bytes of the libraries that a study has loaded at its start, and of the compiled kernels of a subpackage,
+# measured on scenes of 48 x 48 points
+STARTED = 1.2e8
+KERNELS = {"dimensions": 5.0e7, "contact": 6.0e7, "joints": 6.0e7, "domains": 2.0e7}
+PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
+
+
+def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None = None) -> dict[str, float]:
+    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read."""
+    generator = scene.surface.generate
+    if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
+        return {}
+    try:
+        shape, spacing = surface_grid(scene, face)
+    except InvalidInput:
+        return {}
+    surface, block = Plane(shape, generator in PERIODIC), Plane(block_shape(scene, shape, spacing))
+    held = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
+    loaded: set[str] = set()
+    peaks = {}
+    for stage in stages:
+        loaded.add(stage.row.subpackage)
+        libraries = _libraries(loaded)
+        if stage.name == FIGURES:
+            peaks[stage.name] = libraries + held + 24.0 * surface.cells
+            continue
+        if stage.name == "surfaces":
+            peaks[stage.name] = libraries + max(held, _surface_memory(scene, surface))
+            continue
+        takes = stage.row.takes
+        plane = surface if takes == "surface" or (takes == "map" and scene.is_pressed) else block
+        options = call_options(scene, stage.row, stage.keep)
+        steps, shears = _count(options, LOADS), _count(options, ("shear",))
+        section = section_length(steps, int(plane.cells), has_hardness="hardness" in options)
+        planes = section if stage.reads_part else steps * shears if stage.reads_map else 1
+        call = _with_steps(options, section)
+        estimate = public_function(stage.row.function).memory  # type: ignore[attr-defined]
+        working = bytes_on(estimate, Plane(plane.shape, plane.periodic, planes), call)
+        maps = sum(map(map_bytes, stage.keep)) * plane.cells * steps * shears
+        peaks[stage.name] = libraries + held + max(working, 2.0 * maps)
+        held += maps
+    return peaks
+
+
+def check_memory(
+    scene: Scene, stages: Sequence[Stage], workers: int = 0, face: xr.DataArray | None = None
+) -> None:
+    """Raise `TooLittleMemory` unless the stage that needs most fits, in each of several processes."""
+    peaks = stage_memory(scene, stages, face)
+    if not peaks:
+        return
+    name = max(peaks, key=lambda stage: peaks[stage])
+    processes = max(1, workers)
+    needed = peaks[name] * processes - STARTED  # that this process has taken
+    shared = f" in {processes} processes" if processes > 1 else ""
+    require_memory("fractalcontact.scenes.run", needed, f"the stage {name}{shared}")
+
+
+def _libraries(loaded: set[str]) -> float:
+    """Return the bytes of the libraries and kernels of these subpackages."""
+    names = loaded & set(KERNELS) - ({"contact"} if "joints" in loaded else set())  # joints use the same
+    compiled = 6.0e7 + sum(KERNELS[name] for name in names) if names else 0.0  # with the compiler
+    return STARTED + compiled + (9.0e7 if "plotting" in loaded else 0.0)
+
+
+def _surface_memory(scene: Scene, plane: Plane) -> float:
+    """Return the bytes of making or reading the surface."""
+    table = scene.surface
+    if table.generate is None:
+        return 24.0 * plane.cells  # bytes while a file is read
+    function = public_function(f"surfaces.{table.generate}")
+    members = int(generator_options(table).get("members") or 1)
+    return bytes_on(function.memory, replace(plane, planes=members), {})  # type: ignore[attr-defined]
+
+
+def _count(options: dict[str, Any], names: Sequence[str]) -> int:
+    """Return the number of values of the first of these arguments that is given; 1 without any."""
+    given = next((options[name] for name in names if options.get(name) is not None), None)
+    return max(1, int(np.size(given))) if given is not None else 1
+
+
+def _with_steps(options: dict[str, Any], steps: int) -> dict[str, Any]:
+    """Return the arguments with one section of the load path, at one shear: those of a part."""
+    cut = {name: options[name][:steps] for name in LOADS if isinstance(options.get(name), list)}
+    return options | cut | ({"shear": [0.0]} if "shear" in options else {})

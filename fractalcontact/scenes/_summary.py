@@ -12,10 +12,9 @@ from fractalcontact.base.file_contents import stage_rows
 from fractalcontact.base.study import group_of, member_count
 from fractalcontact.base.tables import Note, table
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._caveats import caveats
-from fractalcontact.scenes._joint_rows import aperture_as_placed
-from fractalcontact.scenes._overview import scan_facts, scan_tables
+from fractalcontact.scenes._caveats import aperture_as_placed, caveats
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
+from fractalcontact.scenes._result_tree import scan_facts, scan_tables
 from fractalcontact.scenes._stages import STAGES
 
 MORE = "--verbose and the report have all"

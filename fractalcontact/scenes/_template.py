@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
 from fractalcontact.base.files import files_of, is_pattern
@@ -18,6 +18,9 @@ from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._scene import OF_SURFACE
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Files = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
@@ -39,6 +42,7 @@ def template(
     turn_upper: str | None = None,
     friction_angle: float | None = None,
     wall_strength: float | None = None,
+    surface: xr.DataArray | None = None,
     **reading: Any,
 ) -> str:
     """Return a scene that answers a usual question to a measured surface.
@@ -68,6 +72,8 @@ def template(
     friction_angle, wall_strength : float, optional
         Of a joint: basic friction angle (degree) and compressive strength of its walls, JCS (Pa). With both
         the scene computes the strength, by the criteria and by a shear test with wear, and the datasheet.
+    surface : DataArray, optional
+        The heights of `scan`, where they have been read already.
     **reading
         Arguments of `fractalcontact.surfaces.read` for both files: spacing, units, plane ...
 
@@ -126,7 +132,9 @@ def template(
             problems.number("poisson", poisson, above=-1, at_most=0.5)
         if is_joint:
             _check_files("upper", upper, problems)
-    facts = _facts_of_first(scan, options)
+        if surface is not None:
+            problems.surface("surface", surface, finite=False, smallest=1, leading=True)
+    facts = _facts(_first_surface(scan, options) if surface is None else surface)
     prepared: dict[str, Any] = {"despike": True} if despike else {}
     if is_pressed and (despike or facts["missing"]):
         prepared["fill"] = True
@@ -194,20 +202,21 @@ def _words(scan: Files) -> str:
     return f"the scans in {files[0].resolve().parent.name}" if several else files[0].name
 
 
-def _facts_of_first(scan: Files, options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the facts of the first surface that can be read."""
+def _first_surface(scan: Files, options: Mapping[str, Any]) -> xr.DataArray:
+    """Return the first surface that can be read."""
+    from fractalcontact import surfaces
+
     *files, last = _files(scan)
     for file in files:
         with suppress(FractalContactError):
-            return _facts(file, options)
-    return _facts(last, options)
+            return surfaces.read(file, **options)
+    return surfaces.read(last, **options)
 
 
-def _facts(scan: str | os.PathLike[str], options: Mapping[str, Any]) -> dict[str, Any]:
+def _facts(surface: xr.DataArray) -> dict[str, Any]:
     """Return spacing, extent, rms slope of a surface, and whether it has gaps."""
     from fractalcontact import surfaces
 
-    surface = surfaces.read(scan, **options)
     if "y" not in surface.dims or surface.ndim > 2:
         if surface.ndim > 2:
             raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])

@@ -7,6 +7,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import SmallStrainWarning
+from fractalcontact.base.study import provenance_of
 
 E, NU = 30e9, 0.2
 MODULUS = 15.625e9
@@ -244,3 +245,15 @@ def test_a_prescribed_load_can_be_selected(crack, tmp_path, load):
     assert "state" in result  # as `press` returns by default
     slid = fc.joints.dilatancy(crack, shear=[0.0, 8e-5], direction="E", normal_force=[10.0, 300.0])
     np.testing.assert_array_equal(slid.dilatancy.sel(normal_force=300), slid.dilatancy[..., 1])
+
+
+def test_provenance_names_the_solver_of_the_steps():
+    face = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
+    loads = {"shear": [0.0, 4e-4], "normal_force": [1.0, 10.0]}
+    pressed = fc.joints.closure(crack, **loads)
+    assert provenance_of(pressed)["solver"] == "closed_form (2 steps), node_pairs (2 steps)"  # mated, sheared
+    dense = fc.joints.closure(crack, **loads, method="elimination")
+    assert provenance_of(dense)["solver"] == "closed_form (2 steps), elimination (2 steps)"
+    opened = fc.joints.dilatancy(crack, direction="E", pressed=pressed, **loads)
+    assert provenance_of(opened)["solver"] == "as pressed (4 steps)"

@@ -80,6 +80,20 @@ def test_study_without_a_joint(study, tmp_path):
     assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area"]
 
 
+def test_figure_of_ones_own(study, tmp_path):
+    lacunarity = part(study, "domains/lacunarity")
+
+    def draw(data):
+        assert set(data) == set(lacunarity["domains/lacunarity"].data_vars)
+        return plotting.path(data.isel(box_size=0), "lacunarity")
+
+    figures = {"domains/lacunarity": draw, "domains/islands": draw}  # there are no islands
+    drawn = plotting.draw(lacunarity, tmp_path, figures=figures)
+    assert names(drawn) == ["lacunarity", "lacunarity_maps", "domains_lacunarity"]
+    with pytest.raises(InvalidInput, match="figures: expected a mapping of paths of groups to functions"):
+        plotting.draw(lacunarity, tmp_path, figures={"domains/lacunarity": "lacunarity"})
+
+
 def test_closure_without_maps(study, tmp_path):
     tree = part(study, "joints/closure")
     tree["joints/closure"] = tree["joints/closure"].to_dataset().drop_vars("state")

@@ -311,8 +311,9 @@ def test_analysis_of_the_contact_set_is_on_the_screen(tmp_path):
     """Islands, percolation, lacunarity and signature that a scene asks for, as the functions give them."""
     text = SOUND.replace('"closure", "rigid_dilatancy"]', '"closure"]\nkeep = ["state"]')
     words = '["islands", "percolation", "lacunarity", "signature"]'
-    (tmp_path / "study.toml").write_text(f"{text}domains = {words}\n", encoding="utf-8")
-    tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    (tmp_path / "study.toml").write_text(f"{text}domains = {words}\nfigures = true\n", encoding="utf-8")
+    tree = fc.scenes.run(tmp_path / "study.toml", out=tmp_path / "out", progress=False)
+    assert (tmp_path / "out" / "domains_percolation.png").is_file()  # its entry in the table of stages has it
     shown = fc.scenes.summary(tree)
     assert len(shown.splitlines()) <= 36
     for head in ("islands", "contacts cross", "lacunarity (random)", "spot", "gap"):

@@ -41,6 +41,16 @@ def test_roughness_of_a_list_of_points(scans):
     assert any(name.endswith("surface.png") for name in names)
 
 
+def test_heights_that_were_read_are_not_read_again(scans, monkeypatch):
+    surface, read = fc.surfaces.read("lower.nc"), []
+    expected = fc.scenes.template("roughness", "lower.nc")
+    monkeypatch.setattr(fc.surfaces, "read", lambda path, **options: read.append(path))
+    assert fc.scenes.template("roughness", "lower.nc", surface=surface) == expected
+    assert not read
+    with pytest.raises(InvalidInput, match="surface: expected"):
+        fc.scenes.template("roughness", "lower.nc", surface=np.eye(4))
+
+
 def test_roughness_of_a_profile(scans, capsys):
     """JRC, Z2 and D of a line of heights are those of the functions; other results are not overwritten."""
     profile = fc.surfaces.fbm(512, 2e-4, hurst=HURST, rms_increment=3e-5, rng=3)

@@ -1,4 +1,4 @@
-"""The tables of the stages of a surface: height, roughness, dimension, contact with a flat, partial slip."""
+"""The stages of a surface: height, roughness, dimension, contact with a flat, partial slip."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from fractalcontact.base.file_contents import remarks
 from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._result_tables import Column, length, plain, rows
+from fractalcontact.scenes._scene import PRESS
+from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType
 
 
 def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -29,16 +31,6 @@ def _misfit(state: xr.Dataset) -> str | None:
         return None
     text = plain(np.abs(state["misfit"]), 1)
     return "" if text == "-" else f"z = {text}"
-
-
-dimensions = rows(
-    "fractal dimension", ("method",),
-    Column("dimension D", "fractal_dimension", 3),
-    Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
-    Column("range of scales", ("scale_min", "scale_max")),
-    Column("goodness of fit", _misfit, screen=False),
-    remarks=_of_method,
-)  # fmt: skip
 
 
 def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -61,31 +53,10 @@ def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     yield text
 
 
-surfaces = rows(
-    "ISO 25178", (),
-    Column("Sq", "rms_height"),
-    Column("Sa", "mean_absolute_height", screen=False),
-    Column("Sp", "peak_height", screen=False),
-    Column("Sv", "valley_depth", screen=False),
-    Column("Sz", "peak_to_valley", screen=False),
-    Column("Ssk", "skewness", 3, screen=False),
-    Column("Sku", "kurtosis", 3, screen=False),
-    Column("Sdq", "rms_slope", 3),
-    Column("Sdr", "developed_area_excess", 3, screen=False),
-    Column("Sal", "autocorrelation_length"),
-    Column("Str", "texture_aspect_ratio", 3),
-    Column("Sk", "core_height", screen=False),
-    Column("Spk", "reduced_peak_height", screen=False),
-    Column("Svk", "reduced_valley_depth", screen=False),
-    remarks=_gridding,
-)  # fmt: skip
-texture = rows("texture", (), *surfaces.columns)
-
 AREAS = (
     Column("contact area", "contact_fraction"),
     Column("area, perimeter-corrected", "corrected_contact_fraction", screen=False),
 )
-contact = rows("contact", ("step",), Column("closure", "closure"), *AREAS)
 
 
 def _sticks(state: xr.Dataset) -> str:
@@ -102,12 +73,105 @@ def _slip_limits(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         yield f"shear over normal stiffness of the joint: {ratios} (theory)"
 
 
-partial_slip = rows(
-    "partial slip", ("shear", "step"),
+STATISTICS = (
+    Column("Sq", "rms_height"),
+    Column("Sa", "mean_absolute_height", screen=False),
+    Column("Sp", "peak_height", screen=False),
+    Column("Sv", "valley_depth", screen=False),
+    Column("Sz", "peak_to_valley", screen=False),
+    Column("Ssk", "skewness", 3, screen=False),
+    Column("Sku", "kurtosis", 3, screen=False),
+    Column("Sdq", "rms_slope", 3),
+    Column("Sdr", "developed_area_excess", 3, screen=False),
+    Column("Sal", "autocorrelation_length"),
+    Column("Str", "texture_aspect_ratio", 3),
+    Column("Sk", "core_height", screen=False),
+    Column("Spk", "reduced_peak_height", screen=False),
+    Column("Svk", "reduced_valley_depth", screen=False),
+)
+SLIP_TABLE = rows(
+    "partial slip",
+    ("shear", "step"),
     Column("displacement", "tangential_displacement"),
     Column("sticks", _sticks),
     Column("stiffness", "tangential_stiffness"),
     Column("dissipated energy", "dissipated_energy"),
     remarks=_slip_limits,
     load="tangential_force",
-)  # fmt: skip
+)
+SURFACE = ("surfaces",)
+
+
+def _curve(method: str) -> StageType:
+    name = f"dimensions.{method}"
+    return StageType(f"dimensions/{method}", SURFACE, name, wanted=name, for_figures=True)
+
+
+STAGES = (
+    StageType(
+        "surfaces",
+        (),
+        "surfaces.read",
+        "surface",
+        "surfaces.height",
+        takes="file",
+        rows=rows("ISO 25178", (), *STATISTICS, remarks=_gridding),
+    ),  # with its description
+    StageType("surfaces/description", SURFACE, "surfaces.describe", wanted="surfaces.describe"),
+    StageType(
+        "surfaces/texture",
+        SURFACE,
+        "surfaces.texture",
+        wanted="surfaces.texture",
+        rows=rows("texture", (), *STATISTICS),
+    ),
+    StageType(
+        "dimensions",
+        SURFACE,
+        "dimensions.estimate",
+        "dimensions",
+        rows=rows(
+            "fractal dimension",
+            ("method",),
+            Column("dimension D", "fractal_dimension", 3),
+            Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
+            Column("range of scales", ("scale_min", "scale_max")),
+            Column("goodness of fit", _misfit, screen=False),
+            remarks=_of_method,
+        ),
+    ),
+    _curve("spectrum"),
+    _curve("variogram"),
+    _curve("cube_counts"),
+    _curve("roughness_length"),
+    _curve("variation"),
+    _curve("higuchi"),
+    _curve("detrended_fluctuation"),
+    _curve("divider"),
+    _curve("covering"),
+    StageType(
+        "contact",
+        SURFACE,
+        "contact.press",
+        "contact",
+        f"contact.{PRESS}",
+        keeps=CONTACT_MAPS,
+        splits=("step",),
+        presses=True,
+        one_load=True,
+        rows=rows("contact", ("step",), Column("closure", "closure"), *AREAS),
+    ),
+    # not below contact: its steps are others than those of the load path
+    StageType(
+        PARTIAL_SLIP,
+        SURFACE,
+        "contact.partial_slip",
+        "contact.partial_slip",
+        f"contact.{PARTIAL_SLIP}",
+        keeps=SLIP_MAPS,
+        presses=True,
+        refuses_hardness=True,
+        one_load=True,
+        rows=SLIP_TABLE,
+    ),
+)

@@ -1,4 +1,4 @@
-"""The tables of the stages that analyse the set of true contacts, as `_stages` names them."""
+"""The stages that analyse the set of true contacts."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from fractalcontact.scenes._result_tables import (
     plain,
     rows,
 )
+from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, along_path
 
 
 def _set(title: str, *columns: Column, remarks: Remarks = no_remarks) -> Rows:
@@ -90,35 +91,6 @@ def _crosses(state: xr.Dataset) -> str | None:
     return f"along {' and '.join(axes)}" if axes else "no"
 
 
-islands = _set(
-    "islands",
-    Column("islands", "n_islands", 0),
-    Column("largest island", "largest_island"),
-    Column("mean area", "mean_island_area", screen=False),
-)
-box_dimension = _set_dimension("box_dimension", "box")
-minkowski_dimension = _set_dimension("minkowski_dimension", "Minkowski")
-correlation_dimension = _set_dimension("correlation_dimension", "correlation")
-boundary_dimension = _set_dimension("boundary_dimension", "boundary")
-generalised_dimensions = _set(
-    "generalised dimensions",
-    *(
-        Column(f"D_{order}", at_value("generalised_dimension", "moment_order", order), 2)
-        for order in (0, 1, 2)
-    ),
-)
-lacunarity = _set(
-    "lacunarity",
-    Column("lacunarity (random)", _beside_null("lacunarity", "null_lacunarity")),
-    Column("boxes", _middle_box),
-)
-percolation = _set(
-    "percolation",
-    Column("contacts cross", _crosses),
-    Column("largest share", "largest_share"),
-)
-
-
 def _window_dimension(state: xr.Dataset) -> str | None:
     """Return the dimension over the window and that of random spots, or why there is none."""
     if "domain_dimension" not in state:
@@ -147,7 +119,8 @@ def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         yield f"{count} of {data['signature_flag'].size} states have no dimension, as {reasons[0]}."
 
 
-signature = _set(
+SIGNATURE = "domains/signature"
+SIGNATURE_TABLE = _set(
     "signature of the contact set",
     Column("spot", "spot_size"),
     Column("gap", "gap_size"),
@@ -157,20 +130,88 @@ signature = _set(
     Column("lacunarity x : y", _longest_scale("lacunarity_ratio"), 2, screen=False),
     remarks=_signature_window,
 )
-describe = _set(
-    "contact set",
-    Column("islands", "n_islands", 0),
-    Column("box D (random)", _beside_null("box_dimension", "null_dimension")),
-    Column("D over the window", _window_dimension),
-    Column("clustering", _longest_scale("clustering"), 2),
-    Column("contacts cross", _crosses, screen=False),
-)
-evolution = _set(
-    "evolution",
-    Column("births", "births", 0),
-    Column("deaths", "deaths", 0),
-    Column("merges", "merges", 0),
-    Column("splits", "splits", 0),
-    Column("D (random spots)", _window_dimension, screen=False),
-    remarks=_signature_window,
+
+
+def _domain(name: str, rows: Rows | None = None, needs: tuple[str, ...] = (), **more: Any) -> StageType:
+    source = ("contact or joints/closure", *needs)
+    table, why = f"domains.{name}", "the contact set is analysed"
+    return StageType(
+        f"domains/{name}", source, table, table, table, "map", why, reads="state", rows=rows, **more
+    )
+
+
+STAGES = (
+    # one window of lengths for all states
+    _domain("signature", SIGNATURE_TABLE, whole_path=True),
+    _domain("box_dimension", _set_dimension("box_dimension", "box"), whole_path=True),
+    _domain("box_counts"),
+    _domain("minkowski_dimension", _set_dimension("minkowski_dimension", "Minkowski")),
+    _domain("correlation_dimension", _set_dimension("correlation_dimension", "correlation")),
+    _domain(
+        "generalised_dimensions",
+        _set(
+            "generalised dimensions",
+            *(
+                Column(f"D_{order}", at_value("generalised_dimension", "moment_order", order), 2)
+                for order in (0, 1, 2)
+            ),
+        ),
+    ),
+    _domain("boundary_dimension", _set_dimension("boundary_dimension", "boundary")),
+    _domain(
+        "lacunarity",
+        _set(
+            "lacunarity",
+            Column("lacunarity (random)", _beside_null("lacunarity", "null_lacunarity")),
+            Column("boxes", _middle_box),
+        ),
+    ),
+    _domain(
+        "islands",
+        _set(
+            "islands",
+            Column("islands", "n_islands", 0),
+            Column("largest island", "largest_island"),
+            Column("mean area", "mean_island_area", screen=False),
+        ),
+        keeps=(ISLAND_MAP,),
+        whole_path=True,
+    ),
+    _domain(
+        "percolation",
+        _set(
+            "percolation",
+            Column("contacts cross", _crosses),
+            Column("largest share", "largest_share"),
+        ),
+        figure=along_path("largest_share", "coverage"),
+    ),
+    _domain("hausdorff_content"),
+    _domain(
+        "describe",
+        _set(
+            "contact set",
+            Column("islands", "n_islands", 0),
+            Column("box D (random)", _beside_null("box_dimension", "null_dimension")),
+            Column("D over the window", _window_dimension),
+            Column("clustering", _longest_scale("clustering"), 2),
+            Column("contacts cross", _crosses, screen=False),
+        ),
+        whole_path=True,
+    ),
+    _domain(
+        "evolution",
+        _set(
+            "evolution",
+            Column("births", "births", 0),
+            Column("deaths", "deaths", 0),
+            Column("merges", "merges", 0),
+            Column("splits", "splits", 0),
+            Column("D (random spots)", _window_dimension, screen=False),
+            remarks=_signature_window,
+        ),
+        needs=(SIGNATURE,),
+        whole_path=True,
+    ),
+    _domain("lineage", whole_path=True),
 )

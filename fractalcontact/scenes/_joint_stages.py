@@ -1,0 +1,536 @@
+"""The stages of a joint: its faces, closure, dilatancy, strength, and flow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from fractalcontact.base.study import MEMBER, group_of, provenance_of
+from fractalcontact.base.units import jrc_text, number
+from fractalcontact.scenes._result_tables import (
+    Column,
+    Rows,
+    amount,
+    are_one,
+    at_value,
+    finite,
+    in_turn,
+    length,
+    plain,
+    rows,
+)
+from fractalcontact.scenes._scene import LOADS
+from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType
+from fractalcontact.scenes._surface_stages import AREAS, SLIP_TABLE, SURFACE
+
+OUTSIDE_SCALE = (
+    "A coefficient outside 0 to 20, the scale of the standard profiles, is extrapolated: it only says that "
+    "the face is smoother, or rougher, than all of them."
+)
+
+
+def _outside_scale(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    if (data["scale_position"] != 0).any():
+        yield OUTSIDE_SCALE
+
+
+def _jrc(state: xr.Dataset) -> Any:
+    """Return the roughness coefficient; words for one below the scale."""
+    value = state.get("roughness_coefficient")
+    return jrc_text(float(value)) if value is not None and value.ndim == 0 and value < 0 else value
+
+
+def _jrc_scatter(state: xr.Dataset) -> str | None:
+    """Return the ends of the scatter of the profiles; words for those below the scale."""
+    names = ("roughness_coefficient_low", "roughness_coefficient_high")
+    if not set(names) <= set(state.variables):
+        return None
+    low, high = (float(state[name].mean()) for name in names)
+    if not np.isfinite(low + high):
+        return "none"
+    return " to ".join(dict.fromkeys((jrc_text(low), jrc_text(high))))
+
+
+def _extreme(choose: Any) -> Any:
+    """Return a function that names the azimuth of the largest or smallest roughness."""
+
+    def describe(data: xr.Dataset) -> str | None:
+        metric = data["roughness_metric"]
+        metric = metric.mean(MEMBER) if MEMBER in metric.dims else metric
+        if not metric.notnull().any():
+            return None
+        at = metric.isel(azimuth=int(choose(metric.values)))
+        return f"{float(at):.2f}° toward {float(at['azimuth']):g}°"
+
+    return describe
+
+
+def _azimuths(*_: object) -> Iterator[str]:
+    yield "Azimuths are from E (+x) anticlockwise; a compass bearing is 90° minus the azimuth."
+
+
+def _last_pressure(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
+    """Yield the pressure on the block at the last step, where it is the same for all shears."""
+    if are_one(finite(last["nominal_pressure"])):
+        yield f"at the last step of the load, {amount(last['nominal_pressure'])} on the area of the block"
+
+
+def _greatest_shear(state: xr.Dataset) -> Any:
+    return state["shear"] if "shear" in state.coords else None
+
+
+def _mean_slope(state: xr.Dataset) -> str | None:
+    """Return the slope of the mean plane; None of a face that is level to the digits shown."""
+    is_shown = "mean_slope" in state and float(abs(state["mean_slope"]).max()) >= 0.5e-4
+    return plain(state["mean_slope"], 4, sign=True) if is_shown else None
+
+
+def _strength(name: str) -> Any:
+    """Return a function that takes a variable of the peak where the faces do not lock."""
+
+    def take(state: xr.Dataset) -> Any:
+        if "peak_shear_strength" not in state:
+            return None
+        strength = state["peak_shear_strength"]
+        if not finite(strength).size:
+            return "none: the faces lock" if name == strength.name else ""
+        return state[name].where(np.isfinite(strength))
+
+    return take
+
+
+def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield how the peaks depend on their distance, and what the kinematic form leaves out of them."""
+    if "peak_shear_strength" not in data:
+        return
+    known = data["peak_friction_angle"].notnull()
+    if not known.any():
+        return
+    if comment := data["peak_friction_angle"].attrs.get("comment"):
+        change = _strength_over_half(data)
+        strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
+        yield f"The peak friction angle {comment}.{strength}"
+    elastic = group_of(tree, "joints/elastic_dilatancy")
+    form = provenance_of(data).get("parameters", {}).get("form")
+    if elastic is None or "elastic_energy" not in elastic or form != "kinematic" or "plastic_work" in elastic:
+        return
+    angle = _energy_peak(elastic, data)
+    more, locked = (angle - data["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
+    more = more[np.isfinite(more)]
+    found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
+    found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
+    yield (
+        "It is that of the kinematic form, which leaves out the elastic energy that the faces store while "
+        f'they slide: form = "energy" {" and ".join(found)}.'
+    )
+
+
+def _strength_over_half(friction: xr.Dataset) -> float | None:
+    """Return the greatest relative change of the strength between the two shortest distances."""
+    strengths = friction["secant_shear_strength"].sortby("distance").transpose("distance", ...).values
+    if len(strengths) < 2:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = np.abs(strengths[0] / strengths[1] - 1.0)
+    return float(change[np.isfinite(change)].max()) if np.isfinite(change).any() else None
+
+
+def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
+    """Return the peak friction angle of the energy form over the same distance, of every member."""
+    from fractalcontact import joints
+
+    distance = float(friction["peak_distance"].max())
+    members = range(elastic.sizes[MEMBER]) if MEMBER in elastic.dims else [None]
+    peaks = [
+        joints.friction(
+            elastic if number_of_member is None else elastic.isel({MEMBER: number_of_member}),
+            basic_friction_angle=float(friction["basic_friction_angle"].mean()),
+            form="energy",
+            distance=distance,
+        )["peak_friction_angle"]
+        for number_of_member in members
+    ]
+    return peaks[0] if members == [None] else xr.concat(peaks, MEMBER)
+
+
+def _peak_distance(state: xr.Dataset) -> str | None:
+    return length(state["peak_distance"].max()) if "peak_distance" in state else None
+
+
+def _worn_depth(state: xr.Dataset) -> Any:
+    return state["wear_depth"].max("point", keep_attrs=True) if "wear_depth" in state else None
+
+
+def _at_pressures(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield what the criteria assume, and where they are used outside their range."""
+    if "assumption" in data:
+        names = [str(name) for name in data["criterion"].values]
+        texts = np.atleast_2d(data["assumption"].transpose(..., "criterion").values)  # of every member
+        lines = (f"{name}: {text}" for row in texts for name, text in zip(names, row, strict=True) if text)
+        yield from dict.fromkeys(lines)
+
+
+def _rigid_faces(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    if "converged" not in data:  # nothing was pressed without a modulus
+        yield "of rigid faces"
+
+
+def _weight_strength(state: xr.Dataset) -> Any:
+    strength = state["shear_strength"]
+    return strength if finite(strength).size else "the faces lock"
+
+
+def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
+    """Yield the transmissivity in m3, and for water in the unit of hydrogeology."""
+    values = finite(last["transmissivity"])
+    values = values[values > 0]
+    if values.size:
+        ends = (float(values.min()), float(values.max()))
+        of_water = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight over viscosity, at 20 °C
+        cubes, water = (
+            " to ".join(dict.fromkeys(number(factor * end, 3) for end in ends)) for factor in (1.0, of_water)
+        )
+        yield (
+            f"transmissivity, the hydraulic aperture cubed over 12: {cubes} m³; times unit weight over "
+            f"viscosity, for water at 20 °C, {water} m²/s"
+        )
+
+
+def _uplift_remarks(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield whether the joint has more or less uplift than the guidelines assume."""
+    for shear, state in in_turn(data, "shear"):
+        joint, arm = (state[name].sel(diagram="joint") for name in ("uplift_force", "uplift_arm"))
+        place = f"at shear {shear}: " if shear else ""
+        if not np.isfinite(joint.values).all():
+            yield f"{place}no effective stress on the path of the closure balances the total stress"
+            continue
+        for name in map(str, state["diagram"].values[1:]):
+            more = float((joint / state["uplift_force"].sel(diagram=name)).mean()) - 1.0
+            farther = float((arm - state["uplift_arm"].sel(diagram=name)).mean())
+            way, safe = ("less", "on the safe side") if more < 0 else ("more", "NOT on the safe side")
+            where = "upstream" if farther < 0 else "downstream"
+            yield (
+                f"{place}the {name} diagram is {safe}: the joint has {abs(100 * more):.1f} % {way} uplift, "
+                f"which acts {length(abs(farther))} farther {where}"
+            )
+
+
+def _limits_of_uplift(_: xr.DataTree, water: xr.Dataset) -> Iterator[str]:
+    """Yield where diagrams are unsafe, water is closed off, or no balance was found."""
+    forces = water["uplift_force"]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        more = forces.sel(diagram="joint") / forces.drop_sel(diagram="joint") - 1.0
+    more = more.where(np.isfinite(more))
+    if float(more.max()) > 0:
+        yield (
+            f"joints/uplift: the diagrams are NOT on the safe side: the joint has up to "
+            f"{100 * float(more.max()):.1f} % more uplift."
+        )
+    isolated = float(water["isolated_fraction"].max())
+    if isolated > 0.05:  # less is lost in the pressure beside it
+        yield (
+            f"joints/uplift: up to {100 * isolated:.0f} % of the area is open but closed off from the water; "
+            "over time it may come there too, and the uplift grow."
+        )
+    failed = ~water["converged"]
+    if not bool(failed.any()):
+        return
+    count = f"{int(failed.sum())} of {failed.size}"
+    if "balance_error" not in water:
+        yield f"joints/uplift: {water['converged'].attrs['reason']} in {count} cases."
+        return
+    errors = water["balance_error"].where(failed)
+    if float(errors.min()) < 0:
+        yield (
+            f"joints/uplift: in {int((errors < 0).sum())} of {failed.size} cases the load path of the "
+            "closure ends before the effective stress; give it greater loads."
+        )
+    if float(errors.max()) > 0:
+        yield (
+            f"joints/uplift: in {int((errors > 0).sum())} of {failed.size} cases the water carries more "
+            "than the total stress less the lowest load of the closure: it lifts the joint, or the path "
+            "starts too late."
+        )
+
+
+def _normal_stress(state: xr.Dataset) -> Any:
+    return None if "effective_stress" in state else state["nominal_pressure"]
+
+
+FACES = ("surfaces", "joints/faces")
+JRC_COLUMN = Column("JRC", _jrc, 1)
+
+
+def _joint(
+    name: str, rows: Rows | None = None, needs: tuple[str, ...] = FACES, function: str = "", **more: Any
+) -> StageType:
+    options: dict[str, Any] = {"takes": "crack"} | more
+    function = f"joints.{function or name}"
+    return StageType(
+        f"joints/{name}", needs, function, f"joint.{name}", f"joints.{name}", rows=rows, **options
+    )
+
+
+def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
+    return _joint(name, rows, SURFACE, takes="surface", **more)
+
+
+def _of_gap(name: str, **more: Any) -> StageType:
+    why = f"{name} needs the gap"
+    return _joint(name, needs=("joints/closure",), takes="map", reads="gap", why=why, **more)
+
+
+_ONE: dict[str, Any] = {"one_load": True, "one_direction": True}
+STAGES = (
+    StageType(
+        "joints/faces",
+        SURFACE,
+        "joints.register",
+        "upper",
+        takes="file",
+        rows=rows(
+            "mated position of the upper face",
+            (),
+            Column("shift along x", "shift_x"),
+            Column("shift along y", "shift_y"),
+            Column("rotation", "rotation"),
+            Column("mismatch, rms", "mismatch"),
+            Column("correlation", "correlation", 3),
+        ),
+    ),
+    _joint("delta_surface", None, one_direction=True),
+    _joint(
+        "delta_dimension",
+        rows(
+            "dimension of the delta-surface",
+            ("shear",),
+            Column("D of the delta-surface, by area", "covering_dimension", 3),
+            Column("by variogram", "variogram_dimension", 3, screen=False),
+            Column("by spectrum", "spectrum_dimension", 3, screen=False),
+        ),
+        one_direction=True,
+    ),
+    _joint(
+        "rigid_dilatancy",
+        rows(
+            "rigid dilatancy",
+            ("direction",),
+            Column("shear", _greatest_shear),
+            Column("rigid dilatancy", "rigid_dilatancy"),
+            Column("slope of face", _mean_slope),
+        ),
+        function="dilatancy",
+        keys=("shear", "direction"),
+    ),
+    _joint(
+        "closure",
+        rows(
+            "closure",
+            ("shear",),
+            Column("normal force", "normal_force", screen=False),
+            Column("closure", "closure", screen=False),
+            Column("interface closure", "interface_closure"),
+            *AREAS,
+            remarks=_last_pressure,
+        ),
+        keeps=CONTACT_MAPS,
+        splits=("shear", "step"),
+        presses=True,
+        **_ONE,
+    ),
+    _joint(
+        "closure_laws",
+        rows(
+            "laws of closure",
+            ("shear",),
+            Column("initial stiffness", "initial_stiffness", screen=False),
+            Column("greatest closure", "greatest_closure", screen=False),
+            Column("closure length", "closure_length", screen=False),
+            Column("stiffness", "stiffness", screen=False),
+        ),
+        ("joints/closure",),
+        takes="result",
+        why="closure_laws needs it",
+        keys=("seating_pressure",),  # its closure is the result of another stage, not a load
+    ),
+    _joint(
+        "elimination",
+        rows(
+            "elimination on a part of the block",
+            ("shear",),
+            Column("part of the block", "nominal_area", screen=False),
+            Column("contact area", "contact_fraction", screen=False),
+            Column("rounds", "iterations", 0, screen=False),
+        ),
+        function="closure",
+        splits=("shear", "step"),
+        presses=True,
+        # of a part of the block, and elastic
+        keys=("block", "shear", "direction", *LOADS, "bulk", "influence", "disc_radius", "tolerance"),
+        required=("block",),
+        fixed={"method": "elimination"},
+        **_ONE,
+    ),
+    _joint(
+        "area_dimension",
+        rows(
+            "contact area against the spacing",
+            ("shear", "resolution"),
+            Column("normal force", "normal_force", screen=False),
+            Column("contact area", "contact_fraction"),
+            Column("area dimension", "area_dimension", 2),
+        ),
+        splits=("shear",),
+        presses=True,
+        **_ONE,
+    ),
+    _joint(
+        PARTIAL_SLIP,
+        SLIP_TABLE,
+        keeps=SLIP_MAPS,
+        splits=("shear",),
+        presses=True,
+        refuses_hardness=True,
+        **_ONE,
+    ),
+    _joint(
+        "elastic_dilatancy",
+        rows(
+            "elastic dilatancy",
+            ("direction", "step"),
+            Column("shear", _greatest_shear, screen=False),
+            Column("dilatancy", "dilatancy", screen=False),
+            Column("rigid dilatancy", "rigid_dilatancy", screen=False),
+        ),
+        (*FACES, "joints/closure"),
+        function="dilatancy",
+        splits=("direction", "shear"),
+        required=("normal_force",),
+        presses=True,
+    ),
+    _joint(
+        "friction",
+        rows(
+            "peak shear strength",
+            ("direction", "step"),
+            Column("peak shear strength", _strength("peak_shear_strength")),
+            Column("peak friction angle", _strength("peak_friction_angle")),
+            Column("from shear", _strength("peak_shear"), screen=False),
+            Column("over", _peak_distance),
+            remarks=_peak_remarks,
+        ),
+        ("joints/elastic_dilatancy or joints/rigid_dilatancy",),
+        takes="result",
+        why="friction needs a dilatancy",
+        own=("nominal_pressure",),  # in [joint] it is the load of the closure
+    ),
+    _of_surface(
+        "roughness_coefficient",
+        rows(
+            "joint roughness coefficient (JRC)",
+            ("direction",),
+            JRC_COLUMN,
+            Column("slope Z2", "profile_slope", 3),
+            Column("scatter of the profiles", _jrc_scatter),
+            remarks=_outside_scale,
+        ),
+    ),
+    _of_surface(
+        "directional_roughness",
+        rows(
+            "directional roughness (Grasselli), theta_max / (C + 1)",
+            (),
+            Column("largest roughness metric", _extreme(np.nanargmax)),
+            Column("smallest roughness metric", _extreme(np.nanargmin)),
+            remarks=_azimuths,
+        ),
+    ),
+    _joint(
+        "direct_shear",
+        rows(
+            "direct shear",
+            ("nominal_pressure",),
+            Column("peak strength", "peak_shear_strength"),
+            Column("friction angle", "peak_friction_angle"),
+            Column("residual strength", "residual_shear_strength"),
+            Column("worn depth", _worn_depth),
+        ),
+        splits=("nominal_pressure",),
+        one_direction=True,
+        presses=True,
+    ),
+    _of_surface(
+        "shear_curve",
+        rows(
+            "shear curve",
+            ("nominal_pressure",),
+            Column("peak strength (shear curve)", "peak_shear_strength"),
+            Column("at displacement", "peak_displacement"),
+        ),
+        one_direction=True,
+    ),
+    _of_surface(
+        "strength_envelope",
+        rows(
+            "strength by criterion",
+            ("criterion",),
+            Column("shear strength", "shear_strength"),
+            Column("friction angle", "friction_angle", screen=False),
+            Column("in its range", "in_range", screen=False),
+            remarks=_at_pressures,
+        ),
+        one_direction=True,
+    ),
+    _joint(
+        "self_weight",
+        rows(
+            "strength under self-weight",
+            ("direction", "shear", "structure_size"),
+            Column("shear strength", _weight_strength),
+            Column("exponent of size", "strength_exponent", 3, screen=False),
+            remarks=_rigid_faces,
+        ),
+        presses=True,
+        may_be_rigid=True,
+    ),
+    _joint(
+        "decorrelation_length",
+        rows(
+            "decorrelation",
+            ("direction",),
+            Column("decorrelation length", "decorrelation_length"),
+            Column("95 % interval", ("decorrelation_length_low", "decorrelation_length_high"), screen=False),
+        ),
+        one_direction=True,
+    ),
+    _of_gap(
+        "transmissivity",
+        rows=rows(
+            "aperture",
+            ("shear",),
+            Column("normal force", "normal_force", screen=False),
+            Column("mean aperture", "aperture"),
+            Column("hydraulic (x)", at_value("hydraulic_aperture", "axis", "x")),
+            Column("hydraulic (y)", at_value("hydraulic_aperture", "axis", "y"), screen=False),
+            remarks=_transmissivity,
+        ),
+    ),
+    _of_gap(
+        "uplift",
+        caveats=_limits_of_uplift,
+        rows=rows(
+            "uplift",
+            ("shear",),
+            Column("effective stress", "effective_stress"),
+            Column("normal stress", _normal_stress),
+            Column("uplift", at_value("uplift_force", "diagram", "joint")),
+            Column("of the drained diagram", at_value("uplift_force", "diagram", "drained"), screen=False),
+            Column("of the linear diagram", at_value("uplift_force", "diagram", "linear"), screen=False),
+            Column("arm, joint", at_value("uplift_arm", "diagram", "joint")),
+            remarks=_uplift_remarks,
+        ),
+    ),
+)
