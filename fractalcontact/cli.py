@@ -25,6 +25,7 @@ from fractalcontact.base.errors import (
     MissingExtra,
     ScaleWarning,
     TooLittleMemory,
+    warn,
 )
 from fractalcontact.base.files import is_pattern
 from fractalcontact.base.process import block_dask_import, collect_rarely
@@ -237,7 +238,7 @@ def _answer(options: argparse.Namespace) -> int:
         value = arguments.get(name)
         if value is not None and value < 1e4:  # Pa: below the softest gels, and the weakest clays
             message = f"{option}: {value:g} Pa is {what}; is it {value:g} {unit}?"
-            warnings.warn(message, ScaleWarning, stacklevel=2)
+            warn(message, ScaleWarning)
     place = "." if options.scene else folder
     if options.question == "roughness" and not options.scene and not several:
         from fractalcontact import surfaces

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import provenance
-from fractalcontact.base.errors import FractalContactWarning, InvalidInput
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.study import provenance_of
@@ -147,7 +146,7 @@ class _Source:
             message = (
                 f"{WHERE}: {name} differs from the array of the provenance (other versions of libraries?)"
             )
-            warnings.warn(message, FractalContactWarning, stacklevel=2)
+            warn(message, FractalContactWarning)
         return array
 
     def _file(self, name: str, stated: str) -> Path:

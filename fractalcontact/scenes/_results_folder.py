@@ -15,7 +15,6 @@ import json
 import os
 import secrets
 import shutil
-import warnings
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -32,6 +31,7 @@ from fractalcontact.base.errors import (
     FractalContactWarning,
     InvalidInput,
     UnreadableFile,
+    warn,
 )
 from fractalcontact.base.file_contents import read_headers
 from fractalcontact.base.files import (
@@ -195,7 +195,7 @@ class PartStore:
             return _read_part(path)
         except _DAMAGED:
             message = f"{FOLDER}/{path.name} is damaged or of another origin; that part is computed again"
-            warnings.warn(message, FractalContactWarning, stacklevel=2)
+            warn(message, FractalContactWarning)
             return None
 
     def put(self, key: str, result: xr.Dataset) -> None:

@@ -18,7 +18,7 @@ from typing import Any
 import xarray as xr
 
 from fractalcontact.base import netcdf, signals
-from fractalcontact.base.errors import FractalContactWarning, InvalidInput
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import PARTIAL_RESULT, RESULT, locked, written_whole
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK, most_workers
@@ -38,7 +38,7 @@ from fractalcontact.scenes._scene_file import scans_of
 from fractalcontact.scenes._stages import FIGURES, OWN_FIGURES, check_memory, stages_of
 from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
-from fractalcontact.scenes._validation import implausible_result, validated, warn
+from fractalcontact.scenes._validation import implausible_result, validated, warn_of
 
 
 def run(
@@ -172,7 +172,7 @@ def _run_scans(
         failed = sum(map(bool, studies.reasons.values()))
         if failed:
             message = f"{failed} of {len(scans)} scans failed or are incomplete; the table states why"
-            warnings.warn(message, FractalContactWarning, stacklevel=3)
+            warn(message, FractalContactWarning)
         return tree, whole
 
 
@@ -217,7 +217,7 @@ def _run(
         raise InvalidInput("fractalcontact.scenes.run", study.reasons)
     for name in ("contact", "joints/closure"):
         if name in study.groups:
-            warn(implausible_result(name, study.groups[name]))
+            warn_of(implausible_result(name, study.groups[name]))
     tree = result_tree(scene, study)
     if not study.failures:
         tree.attrs.update(facts)

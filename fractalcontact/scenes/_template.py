@@ -6,13 +6,12 @@ import importlib.resources
 import json
 import math
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
+from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import files_of, is_pattern
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import quantity_text
@@ -253,7 +252,7 @@ def _roughness(facts: Mapping[str, Any], lag: float = 0.508e-3) -> dict[str, Any
         message = (
             f"JRC is left out: its readings are {readings} apart, and the points of this face {distance}"
         )
-        warnings.warn(message, FractalContactWarning, stacklevel=3)
+        warn(message, FractalContactWarning)
     return {"has_jrc": is_long and spacing <= lag}
 
 

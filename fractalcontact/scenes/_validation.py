@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory
+from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory, warn
 from fractalcontact.base.grid import distinct, plane_coords
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.resources import require_memory
@@ -98,7 +97,7 @@ def validated(scene: Scene | str | os.PathLike[str]) -> tuple[Scene, dict[str, x
             scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
         _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
-    warn(implausible_input(scene, surfaces["surface"]))
+    warn_of(implausible_input(scene, surfaces["surface"]))
     return scene, {name: face for name, face in surfaces.items() if "generate" not in scene.table(name)}
 
 
@@ -340,10 +339,10 @@ def _empty_maps(
     return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)
 
 
-def warn(messages: Iterable[str]) -> None:
+def warn_of(messages: Iterable[str]) -> None:
     """Warn of every implausible value."""
     for message in messages:
-        warnings.warn(message, ScaleWarning, stacklevel=3)
+        warn(message, ScaleWarning)
 
 
 def _rms_slope(heights: np.ndarray[Any, Any], spacing: tuple[float, float]) -> float:
