@@ -1,4 +1,4 @@
-"""Closure laws of a joint under normal load, with the empirical laws that fit them."""
+"""A joint under normal load: closure with the laws that fit it, hydraulic aperture, uplift."""
 
 from __future__ import annotations
 
@@ -6,15 +6,24 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base.validation import Problems
-from fractalcontact.plotting import _style
+from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._figure import figure
-from fractalcontact.plotting._inputs import nearest, result_of, table
+from fractalcontact.plotting._inputs import (
+    extent_of,
+    nearest,
+    quantity,
+    require_dims,
+    result_of,
+    table,
+    words,
+)
 from fractalcontact.plotting._line_panel import LinePanel
-from fractalcontact.plotting._paths import PATH, by_shear
-from fractalcontact.plotting._style import Axes
-from fractalcontact.plotting._units import Units
+from fractalcontact.plotting._paths import PATH, by_shear, path_axis
+from fractalcontact.plotting._style import Axes, AxesArray, Panels
+from fractalcontact.plotting._units import Quantity, Units, scale_of
 
 LAW_CONSTANTS = ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
 LAWS = {"exponential": _style.DASHED, "hyperbolic": _style.DOTTED}  # line where not preferred
@@ -118,3 +127,111 @@ def _draw_laws(closure: Any, laws: Any, key: bool, log: bool, units: Units | Non
     for name, other in LAWS.items():
         panel.key(f"{name}, not preferred", **other)
     return panel.finish(log="xy" if log else "y", title="law", legend=key)
+
+
+@figure
+def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the hydraulic aperture against load, one curve per shear displacement and flow direction.
+
+    The aperture is zero where contacts block the flow from side to side. Broad pale lines show the
+    mechanical aperture (mean gap) if the result has it.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.transmissivity`: hydraulic_aperture (m) over (shear, step, axis), or
+        over some of them, and aperture (m) over (shear, step). With a single step it is drawn against shear.
+    {shared}
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e5, 1e6], keep=("gap",))
+    >>> ax = fc.plotting.hydraulic_aperture(fc.joints.transmissivity(pressed["gap"]))
+    >>> print(ax.get_ylabel())
+    hydraulic aperture (µm)
+    """
+    data = result_of(result, ("hydraulic_aperture",), (*PATH, "axis"), units)
+    dims, x, family = path_axis(data, None)
+    aperture = quantity(data, "hydraulic_aperture", ("axis", *dims))
+    panel = LinePanel.of(ax, data, x, aperture, dims, family, points=_style.MAX_MARKED_POINTS)
+    axes = words(data["axis"]) if "axis" in data.coords else []
+    for i, values in enumerate(aperture.values):
+        name = f"along {axes[i]}" if axes else "flow"
+        panel.curves(name, values, key=name if axes else "", ls=_style.LINES[i % 2])
+    if "aperture" in data:
+        # three times as broad as a curve and pale, so that it is seen where the hydraulic aperture lies on it
+        broad: dict[str, Any] = {"lw": 4.5, "alpha": 0.3, "solid_capstyle": "butt", "zorder": 1.5}
+        panel.curves("mean gap", "aperture", key="mean gap", marker="", **broad)
+    return panel.finish(log="x" if _style.needs_log_axis(x.values) else "", zero="y", title="flow")
+
+
+LINES: dict[str, dict[str, Any]] = {
+    "joint": {"color": _style.BLUE, "ls": "-"},
+    "linear": _style.DASHED,
+    "bilinear": {"color": _style.RED} | _style.DASH_DOTTED,
+}
+
+
+@figure
+def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
+    """Draw the water pressure in a joint and, beside it, the uplift along the flow with its lines of action.
+
+    The diagrams of guidelines are dashed. A triangle on the axis marks each line of action. Contacts and
+    pockets that no water reaches are grey in the map and carry no uplift.
+
+    Parameters
+    ----------
+    result : Dataset or node of a DataTree
+        From `fractalcontact.joints.uplift`, of one gap.
+    {shared}
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import fractalcontact as fc
+    >>> gap = fc.surfaces.from_array(np.full((8, 16), 1e-4), 1.0)
+    >>> pressure, uplift = fc.plotting.uplift(fc.joints.uplift(gap, upstream_pressure=490e3))
+    >>> print(uplift.get_ylabel())
+    uplift (kPa)
+    """
+    data = result_of(result, ("fluid_pressure", "uplift_profile", "uplift_x", "uplift_y"), (), units)
+    plane = _maps.plane_of(data[["fluid_pressure"]], "fluid_pressure")
+    profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
+                                              and d not in ("diagram", "x", "y")])  # fmt: skip
+    names = ("uplift_profile", "uplift_x", "uplift_y", "diagram")
+    require_dims(data, dict.fromkeys(names, "diagram"))
+    with Problems("fc.plotting") as problems:
+        problems.require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
+        diagrams = words(data["diagram"])
+        are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
+        problems.require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)
+    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), width_ratios=(1.0, 1.1))
+    _maps.draw_values(left, plane)
+    left.set_title(_state(data))
+    dim = "x" if "x" in profile.dims else "y"
+    length, pressure = _maps.plane_scale(plane), scale_of(plane)
+    place = Quantity(profile[dim].values, length, f"${dim}$")
+    panel = LinePanel(right, place, Quantity(profile.values, pressure, "uplift"), points=0)
+    mark: dict[str, Any] = {"marker": "^", "ls": "", "ms": 6, "clip_on": False, "zorder": 3}
+    for name in diagrams:
+        style = {"color": _style.ink(), **LINES[name]}
+        panel.line(name, place.values, profile.sel(diagram=name).values, key=name, **style)
+        action = float(data[f"uplift_{dim}"].sel(diagram=name))
+        panel.line("_action", [action], [0.0], color=style["color"], **mark)
+    panel.key("line of action", marker="^", ls="")
+    start, end = extent_of(plane)[:2] if dim == "x" else extent_of(plane)[2:]
+    right.set_xlim(float(length(start)), float(length(end)))
+    right.set_ylim(bottom=0.0)
+    panel.finish()
+    return shown
+
+
+def _state(data: xr.Dataset) -> str:
+    """Return shear and normal stress of the joint that is shown, as far as the result has them."""
+    shown = {"shear": "shear", "effective_stress": "effective stress", "nominal_pressure": "normal stress"}
+    present = [name for name in shown if name in data.variables and data[name].size == 1]
+    present = [name for name in present if not (name == "nominal_pressure" and "effective_stress" in present)]
+    texts = {name: scale_of(data[name]).text(np.ravel(data[name].values)[0]) for name in present}
+    return ", ".join(f"{shown[name]} {text}" for name, text in texts.items() if text != "-")

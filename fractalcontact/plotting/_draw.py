@@ -18,21 +18,25 @@ from fractalcontact.base.resources import DRAWING_LOCK
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import group_of, member_count
 from fractalcontact.base.validation import Problems, writing
-from fractalcontact.plotting._closure import closure_laws
+from fractalcontact.plotting._closure import closure_laws, hydraulic_aperture, uplift
 from fractalcontact.plotting._contact_curves import area_dimension, contact_area, slip_loops
 from fractalcontact.plotting._curves import curves
-from fractalcontact.plotting._dilatancy import correlation, delta_dimension, dilatancy
-from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions
-from fractalcontact.plotting._directional_roughness import directional_roughness
-from fractalcontact.plotting._ensemble import draw_with_band, reduced_trees
+from fractalcontact.plotting._dimensions import curve_of, dimension_curves, dimensions, directional_roughness
+from fractalcontact.plotting._ensemble import draw_with_band, reduced_trees, scans
 from fractalcontact.plotting._fields import contact_domains, first_contact, surface
-from fractalcontact.plotting._flow import hydraulic_aperture, uplift
 from fractalcontact.plotting._inputs import words
 from fractalcontact.plotting._islands import alluvial, islands, lineage
 from fractalcontact.plotting._paths import at_shear, evenly_sampled_reach, loaded_steps, shear_text
-from fractalcontact.plotting._scans import scans
 from fractalcontact.plotting._size_curves import box_dimension, lacunarity, signature
-from fractalcontact.plotting._strength import friction, self_weight, shear_curve, strength_envelope
+from fractalcontact.plotting._strength import (
+    correlation,
+    delta_dimension,
+    dilatancy,
+    friction,
+    self_weight,
+    shear_curve,
+    strength_envelope,
+)
 from fractalcontact.plotting._style import Figure, drawn_for_files, figure_of, needs_log_axis
 from fractalcontact.plotting._units import UNITS_EXPECTED, Units, marked, require_units
 
