@@ -8,8 +8,8 @@ text, and what could not, is listed on page `theory_joints`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,19 +21,49 @@ from fractalcontact.base.validation import Problems
 SAMPLE_LENGTH = 0.1  # m: the joint to which JRC and JCS of a laboratory sample refer
 LARGEST_JRC = 20.0  # end of the scale of standard profiles (Barton and Choubey 1977)
 POSITIVE: dict[str, Any] = {"at_least": 1e-30, "at_most": 1e30}  # ratios and powers do not overflow
+
+
+def _argument(default: float = math.nan, **bounds: Any) -> Any:
+    """Return a field of `Joint` that is an argument, with its bounds."""
+    return field(default=default, metadata=bounds)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """What a criterion of strength may depend on; NaN where it is not known.
+
+    The first fields are arguments of `strength_envelope`, the last ones are measured alone.
+    """
+
+    wall_strength: float = _argument(**POSITIVE)
+    basic_friction_angle: float = _argument(above=0, below=90)
+    residual_friction_angle: float = _argument(above=0, below=90)
+    roughness_coefficient: float = _argument(at_least=0, at_most=LARGEST_JRC)
+    asperity_angle: float = _argument(at_least=0, below=90)
+    tensile_strength: float = _argument(**POSITIVE)
+    cohesion: float = _argument(**POSITIVE | {"at_least": 0})
+    length: float = _argument(SAMPLE_LENGTH, **POSITIVE | {"at_least": SAMPLE_LENGTH})
+    area_fraction: float = math.nan  # A0, C and theta_max of `directional_roughness`
+    shape: float = math.nan
+    theta_max: float = math.nan
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any], measured: Mapping[str, Any]) -> Joint:
+        """Return the joint by arguments, None where they are not given, and by what is measured."""
+        names = [entry.name for entry in fields(cls)]
+        known = {name: float(given[name]) for name in names if given.get(name) is not None}
+        defaults = {
+            "tensile_strength": known["wall_strength"] / 10.0,  # of a hard rock (Hoek and Bray 1981)
+            "residual_friction_angle": known["basic_friction_angle"],
+        }
+        return cls(**defaults | {name: value.item() for name, value in measured.items()} | known)
+
+
 # of the arguments of the functions around these formulas
-BOUNDS: dict[str, dict[str, Any]] = {
+BOUNDS: dict[str, Mapping[str, Any]] = {
     "aperture": POSITIVE,
-    "asperity_angle": {"at_least": 0, "below": 90},
-    "basic_friction_angle": {"above": 0, "below": 90},
-    "cohesion": POSITIVE | {"at_least": 0},
     "compressive_strength": POSITIVE,
-    "length": POSITIVE | {"at_least": SAMPLE_LENGTH},
-    "residual_friction_angle": {"above": 0, "below": 90},
-    "roughness_coefficient": {"at_least": 0, "at_most": LARGEST_JRC},
-    "tensile_strength": POSITIVE,
-    "wall_strength": POSITIVE,
-}
+} | {entry.name: entry.metadata for entry in fields(Joint) if entry.metadata}
 
 # Shear strength
 
@@ -44,7 +74,7 @@ def check_quantities(problems: Problems, *required: str, **bounds: dict[str, Any
     """Check the arguments of the call that have `BOUNDS`, or others here; those required not None."""
     for name in vars(problems.given):
         if name in BOUNDS:
-            problems.number(name, **BOUNDS[name] | bounds.get(name, {}), optional=name not in required)
+            problems.number(name, **{**BOUNDS[name], **bounds.get(name, {})}, optional=name not in required)
 
 
 def check_measured(problems: Problems, *measures: Any) -> None:
@@ -54,23 +84,6 @@ def check_measured(problems: Problems, *measures: Any) -> None:
         for measure in measures:
             with problems.collect():
                 measure.validate(problems.given.surface, **options)
-
-
-@dataclass(frozen=True)
-class Joint:
-    """What a criterion of strength may depend on; NaN where it is not known."""
-
-    roughness_coefficient: float
-    asperity_angle: float
-    wall_strength: float
-    tensile_strength: float
-    basic_angle: float
-    residual_angle: float
-    cohesion: float = math.nan
-    length: float = SAMPLE_LENGTH
-    area_fraction: float = math.nan  # A0, C and theta_max of `directional_roughness`
-    shape: float = math.nan
-    theta_max: float = math.nan
 
 
 def scaled_roughness(roughness: Any, length: Any) -> Any:
@@ -158,8 +171,8 @@ def barton_shear(
 
 def patton(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     """Return the strength of asperities that are overridden or sheared off, whichever needs less."""
-    overridden = pressure * math.tan(math.radians(joint.basic_angle + joint.asperity_angle))
-    sheared = joint.cohesion + pressure * math.tan(math.radians(joint.residual_angle))
+    overridden = pressure * math.tan(math.radians(joint.basic_friction_angle + joint.asperity_angle))
+    sheared = joint.cohesion + pressure * math.tan(math.radians(joint.residual_friction_angle))
     return np.minimum(overridden, sheared), np.ones(pressure.shape, dtype=bool)
 
 
@@ -174,7 +187,7 @@ def ladanyi_archambault(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     remaining = np.clip(1.0 - relative, 0.0, None)
     sheared = 1.0 - remaining**1.5  # a
     dilation = remaining**4.0 * math.tan(math.radians(joint.asperity_angle))  # v
-    friction = math.tan(math.radians(joint.basic_angle))
+    friction = math.tan(math.radians(joint.basic_friction_angle))
     ratio = joint.wall_strength / joint.tensile_strength  # n
     material = joint.wall_strength * (math.sqrt(1.0 + ratio) - 1.0) / ratio * np.sqrt(1.0 + ratio * relative)
     overridden = pressure * (1.0 - sheared) * (dilation + friction)
@@ -194,7 +207,8 @@ def barton_bandis(pressure: Array, joint: Joint) -> tuple[Array, Array]:
 
 
 def _barton(pressure: Array, joint: Joint, roughness: float, wall_strength: float) -> tuple[Array, Array]:
-    angle = joint.residual_angle + roughness_angle(pressure, roughness, wall_strength, joint.residual_angle)
+    residual_angle = joint.residual_friction_angle
+    angle = residual_angle + roughness_angle(pressure, roughness, wall_strength, residual_angle)
     inside = in_tested_range(pressure, wall_strength, joint.roughness_coefficient) & (angle < LARGEST_ANGLE)
     return pressure * np.tan(np.radians(angle)), inside
 
@@ -214,18 +228,18 @@ def grasselli_egger(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     decay = joint.theta_max / (9.0 * facets) if facets > 0 else math.inf
     with np.errstate(under="ignore"):
         share = np.exp(-decay * pressure / joint.tensile_strength)
-    strength = pressure * math.tan(math.radians(joint.residual_angle)) * (1.0 + share)
+    strength = pressure * math.tan(math.radians(joint.residual_friction_angle)) * (1.0 + share)
     return strength, _by_facets(pressure, joint)
 
 
 def xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     """Return sigma tan(phi_b + 4 A0 t [1 + exp(-t sigma/(9 A0 sigma_t))]), t = theta_max/(C + 1), degree."""
     if joint.area_fraction == 0:
-        return pressure * math.tan(math.radians(joint.basic_angle)), _by_facets(pressure, joint)
+        return pressure * math.tan(math.radians(joint.basic_friction_angle)), _by_facets(pressure, joint)
     metric = joint.theta_max / (joint.shape + 1.0)
     with np.errstate(under="ignore"):
         share = np.exp(-metric / (9.0 * joint.area_fraction) * pressure / joint.tensile_strength)
-    angle = joint.basic_angle + 4.0 * joint.area_fraction * metric * (1.0 + share)
+    angle = joint.basic_friction_angle + 4.0 * joint.area_fraction * metric * (1.0 + share)
     possible = angle < 90.0
     strength = pressure * np.tan(np.radians(np.where(possible, angle, np.nan)))
     # A0 of the joints of Xia et al. is near one half. The factor 4 A0 is 2 there and 20 % off at the bounds;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,7 +14,6 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._criteria import (
     POSITIVE,
-    SAMPLE_LENGTH,
     STRENGTH,
     STRENGTH_REFERENCES,
     Joint,
@@ -156,40 +154,31 @@ def strength_envelope(
     pressure = float_array(nominal_pressure)
     given = {
         "surface": surface,
+        "wall_strength": wall_strength,
+        "basic_friction_angle": basic_friction_angle,
         "residual_friction_angle": residual_friction_angle,
         "roughness_coefficient": roughness_coefficient,
         "asperity_angle": asperity_angle,
+        "tensile_strength": tensile_strength,
         "cohesion": cohesion,
         "length": length,
     }
     chosen = _usable(given) if criterion is None else word_tuple(criterion)
     measured = _measured(surface, direction)
-    jrc = measured.pop("roughness_coefficient", xr.DataArray(math.nan))
-    dip = measured.pop("mean_dip", xr.DataArray(math.nan))
-    joint = Joint(
-        roughness_coefficient=jrc.item() if roughness_coefficient is None else float(roughness_coefficient),
-        asperity_angle=dip.item() if asperity_angle is None else float(asperity_angle),
-        wall_strength=float(wall_strength),
-        # of a hard rock (Hoek and Bray 1981)
-        tensile_strength=float(tensile_strength or wall_strength / 10.0),
-        basic_angle=float(basic_friction_angle),
-        residual_angle=float(residual_friction_angle or basic_friction_angle),
-        cohesion=math.nan if cohesion is None else float(cohesion),
-        length=float(length or SAMPLE_LENGTH),
-        **{name: value.item() for name, value in measured.items()},
-    )
+    joint = Joint.of(given, measured)
     with Problems(WHERE) as problems:
-        total = joint.asperity_angle + joint.basic_angle
+        total = joint.asperity_angle + joint.basic_friction_angle
         expected = "less than 90 degrees with the basic friction angle"
         problems.require(not total >= 90.0, "asperity_angle", expected, f"{total:g}")
     strengths, ranges = zip(*(STRENGTH[name].strength(pressure, joint) for name in chosen), strict=True)
+    measured_notes = measured["roughness_coefficient"].attrs if measured else {}
     dims = ("criterion", "nominal_pressure")
     variables: dict[str, Any] = {
         "shear_strength": (dims, np.array(strengths)),
         "friction_angle": (dims, np.degrees(np.arctan(np.array(strengths) / pressure))),
         "in_range": (dims, np.array(ranges)),
         "assumption": ("criterion", np.array([STRENGTH[name].assumption for name in chosen])),
-        "roughness_coefficient": ((), joint.roughness_coefficient, jrc.attrs),
+        "roughness_coefficient": ((), joint.roughness_coefficient, measured_notes),
         "asperity_angle": joint.asperity_angle,
     }
     if length is not None:
@@ -210,8 +199,11 @@ def _measured(surface: xr.DataArray | None, direction: Any) -> dict[str, xr.Data
         return {}
     jrc = measured_coefficient(surface, direction=direction)
     facets = directional_roughness(surface, direction=direction)
-    names = ("mean_dip", "area_fraction", "shape", "theta_max")
-    return {"roughness_coefficient": jrc["roughness_coefficient"]} | {name: facets[name] for name in names}
+    names = ("area_fraction", "shape", "theta_max")
+    return {
+        "roughness_coefficient": jrc["roughness_coefficient"],
+        "asperity_angle": facets["mean_dip"],
+    } | {name: facets[name] for name in names}
 
 
 def _explain(result: xr.Dataset, has_surface: bool) -> None:
