@@ -1,5 +1,6 @@
 """Exceptions and warnings of the package, one class for each cause."""
 
+import importlib.util
 import inspect
 import warnings
 from collections.abc import Sequence
@@ -27,9 +28,9 @@ class InvalidInput(FractalContactError, ValueError):
 
     def __str__(self) -> str:
         """Return a line for each problem."""
-        return "\n".join(
-            [f"{self.where}: {_count(len(self.problems))}", *(f"  - {p}" for p in self.problems)]
-        )
+        count = len(self.problems)
+        head = f"{self.where}: {count} problem{'s' * (count != 1)}"
+        return "\n".join([head, *(f"  - {problem}" for problem in self.problems)])
 
 
 class UnreadableFile(InvalidInput):
@@ -58,6 +59,12 @@ class MissingExtra(FractalContactError, ImportError):
         """Return what is missing and how to install it."""
         purpose, library, extra = self.args
         return f"{purpose} needs {library}: pip install 'fractalcontact[{extra}]'"
+
+
+def require_library(purpose: str, library: str, extra: str) -> None:
+    """Raise `MissingExtra` unless an optional library is installed."""
+    if importlib.util.find_spec(library) is None:
+        raise MissingExtra(purpose, library, extra)
 
 
 class FractalContactWarning(UserWarning):
@@ -90,7 +97,3 @@ def warn(message: str, category: type[FractalContactWarning]) -> None:
     while frame is not None and frame.f_globals.get("__name__", "").startswith("fractalcontact."):
         frame, level = frame.f_back, level + 1
     warnings.warn(message, category, stacklevel=level)
-
-
-def _count(number: int) -> str:
-    return "1 problem" if number == 1 else f"{number} problems"

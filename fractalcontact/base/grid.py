@@ -290,12 +290,6 @@ def _decades(decades: int) -> str:
     return f"1e-{decades} to 1e{decades} m"
 
 
-def tree_faults(value: Any, argument: str) -> Iterator[Fault]:
-    """Yield a fault where a value is not the DataTree of a study."""
-    if not isinstance(value, xr.DataTree):
-        yield argument, "a DataTree, from fractalcontact.scenes.run or fractalcontact.open", value
-
-
 def result_faults(data: Any, argument: str) -> Iterator[Fault]:
     """Yield the faults of the variables whose names the schema has; others are not looked at."""
     if not isinstance(data, xr.Dataset):

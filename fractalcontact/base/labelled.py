@@ -22,6 +22,10 @@ from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import Problems, float_array
 
+SURFACE, SPACING = "surface", "spacing"
+MASK, VALID = "mask", "valid"
+MASK_DIMS = ("step", "y", "x")  # of a plain array; of one row of cells (x,)
+
 
 def leading_coords(
     array: xr.DataArray | xr.Dataset, outer: Collection[Hashable], taken: Collection[str] = ()
@@ -65,11 +69,6 @@ def check_leading(
 def _levels(array: xr.DataArray | xr.Dataset) -> set[Hashable]:
     """Return the names of multi-level indexes and of their levels."""
     return {name for name, index in array.xindexes.items() if isinstance(index, PandasMultiIndex)}
-
-
-SURFACE, SPACING = "surface", "spacing"
-MASK, VALID = "mask", "valid"
-MASK_DIMS = ("step", "y", "x")  # of a plain array; of one row of cells (x,)
 
 
 def usual_arguments(where: str, arguments: dict[str, Any], spacing: Any = None) -> str:

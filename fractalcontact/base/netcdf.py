@@ -11,7 +11,6 @@ one lock of the process is held for the whole file, and xarray gets a file that 
 from __future__ import annotations
 
 import contextlib
-import importlib.util
 import os
 import shutil
 from collections.abc import Iterator, Mapping
@@ -21,7 +20,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput, MissingExtra, UnreadableFile
+from fractalcontact.base.errors import InvalidInput, UnreadableFile, require_library
 from fractalcontact.base.files import (
     DAMAGED,
     NETCDF_LOCK,
@@ -202,8 +201,8 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
         expected = "'auto', a size of blocks, or a mapping of dims to sizes"
         are_sizes = chunks is None or _is_size(chunks) or _are_sizes(chunks)
         problems.require(are_sizes, "chunks", expected, chunks)
-    if chunks is not None and importlib.util.find_spec("dask") is None:
-        raise MissingExtra("chunks", "dask", "dask")
+    if chunks is not None:
+        require_library("chunks", "dask", "dask")
     source = Path(path)
     try:
         tree = xr.DataTree.from_dict(_read(source) if chunks is None else _opened(source, chunks))
@@ -330,15 +329,11 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
         for key in dataset.variables.keys() - set(numbers):
             dataset.variables[key].load()  # coordinates, and words, whose blocks dask cannot size
         # without the coordinates, which `chunk` would cut as well
-        values = dataset[numbers].reset_coords(drop=True)
-        groups[name] = dataset.assign(values.chunk(_own_chunks(chunks, values)).data_vars)
+        values, sizes = dataset[numbers].reset_coords(drop=True), chunks
+        if isinstance(chunks, Mapping):
+            sizes = {dim: size for dim, size in chunks.items() if dim in values.dims}
+        groups[name] = dataset.assign(values.chunk(sizes).data_vars)
     return groups
-
-
-def _own_chunks(chunks: Any, dataset: xr.Dataset) -> Any:
-    """Return the sizes of blocks along the dims that a group has."""
-    is_by_dim = isinstance(chunks, Mapping)
-    return {dim: size for dim, size in chunks.items() if dim in dataset.dims} if is_by_dim else chunks
 
 
 def _is_size(size: object) -> bool:

@@ -32,6 +32,13 @@ SMALL_FILE = 1 << 28  # bytes that any file may unpack to: about what the librar
 PLANES = ("surface", "crack", "mask", "gap", "heights")  # arguments that have a grid
 # arguments of several values, each of which gives a map
 PATHS = ("closure", "normal_force", "nominal_pressure", "tangential_force", "shear", "direction")
+SHARE = 32768  # elements worth a thread of their own: a transform takes 33 us, to hand it over 17 us
+LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
+NAME = "fractalcontact"  # of the threads that wait for bands
+# matplotlib is not safe in threads: its parser of formulas is shared, and so are its settings
+DRAWING_LOCK = threading.RLock()
+
+_limit: ContextVar[int | None] = ContextVar("fractalcontact_threads", default=None)
 
 
 class Free(NamedTuple):
@@ -263,15 +270,6 @@ def require_unpacked(where: str, name: str, unpacked: int, limit: int) -> None:
         expected = f"at most {limit / 2**20:.0f} MiB when unpacked, for its size"
         raise UnreadableFile(where, [f"path: {name!r}: expected {expected}, got {unpacked / 2**20:.0f} MiB"])
     require_memory(where, unpacked, f"{name!r} when unpacked")
-
-
-SHARE = 32768  # elements worth a thread of their own: a transform takes 33 us, to hand it over 17 us
-LIMITS = ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS")
-NAME = "fractalcontact"  # of the threads that wait for bands
-# matplotlib is not safe in threads: its parser of formulas is shared, and so are its settings
-DRAWING_LOCK = threading.RLock()
-
-_limit: ContextVar[int | None] = ContextVar("fractalcontact_threads", default=None)
 
 
 def thread_count() -> int:

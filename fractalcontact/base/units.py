@@ -34,6 +34,12 @@ SPELLINGS = {
     "inches": "inch",
 }
 UNITS = (*METRES, *PER_METRE, *SPELLINGS)
+PREFIXES = {
+    18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
+}  # fmt: skip
+PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
+PRESSURE = re.compile(r"^\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*$")
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def in_metres(values: Any, units: str) -> Any:
@@ -42,14 +48,6 @@ def in_metres(values: Any, units: str) -> Any:
     if name in METRES:
         return values if name == "m" else values * METRES[name]
     return values / PER_METRE[name]
-
-
-PREFIXES = {
-    18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
-}  # fmt: skip
-PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
-PRESSURE = re.compile(r"^\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*$")
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)

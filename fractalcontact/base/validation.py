@@ -261,6 +261,12 @@ class Problems:
 
         return self._add_all(missing_faults(np.asarray(array), argument, remedy))
 
+    def not_infinite(self, argument: str, values: np.ndarray, what: str = "heights") -> bool:
+        """Check that values are finite, or missing (NaN, masked); otherwise report how many are infinite."""
+        infinite = int(np.count_nonzero(np.ma.filled(np.isinf(values), False)))
+        expected = f"finite {what}, or NaN where missing"
+        return self.require(infinite == 0, argument, expected, f"{infinite} infinite")
+
     def path(self, argument: str, value: Any = GIVEN, *, what: str = "the path of a file") -> bool:
         """Check for the path of a file: text or a `pathlib.Path` that a file system can hold."""
         value = self._value(argument, value)
@@ -308,9 +314,11 @@ class Problems:
 
     def tree(self, argument: str, value: Any = GIVEN) -> bool:
         """Check for the DataTree of a study."""
-        from fractalcontact.base.grid import tree_faults  # loads xarray
+        import xarray as xr  # loads slowly
 
-        return self._add_all(tree_faults(self._value(argument, value), argument))
+        expected = "a DataTree, from fractalcontact.scenes.run or fractalcontact.open"
+        value = self._value(argument, value)
+        return self.require(isinstance(value, xr.DataTree), argument, expected, value)
 
     def result(self, argument: str, value: Any = GIVEN) -> bool:
         """Check that a labelled result has the dims, types and units of the schema."""

@@ -50,13 +50,7 @@ def check_heights(problems: Problems, heights: Any = GIVEN) -> int | None:
     for name, size in zip(("y", "x")[2 - axes :], values.shape[-axes:] if axes else (), strict=False):
         problems.require(size >= 2, f"heights ({name})", "at least 2 points", size)
     if not _is_lazy(values):
-        is_infinite = np.isinf(np.ma.getdata(values))
-        if is_infinite.any():
-            is_infinite &= ~np.ma.getmaskarray(values)
-        infinite = int(np.count_nonzero(is_infinite))
-        problems.require(
-            infinite == 0, "heights", "finite values, or NaN where missing", f"{infinite} infinite"
-        )
+        problems.not_infinite("heights", values, "values")
     return axes if len(problems.messages) == before else None
 
 
@@ -282,9 +276,7 @@ def check_stack(problems: Problems, *, smallest: int = 2, is_map: bool = False) 
     several = not is_map
     if not problems.surface("surface", finite=False, smallest=smallest, leading=several, profile=several):
         return False
-    infinite = int(np.count_nonzero(np.isinf(problems.given.surface.values)))
-    expected = "finite heights, or NaN where missing"
-    return problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
+    return problems.not_infinite("surface", problems.given.surface.values)
 
 
 def height_stack(surface: xr.DataArray) -> Array:

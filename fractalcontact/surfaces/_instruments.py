@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import warnings
 from collections.abc import Iterator, Sequence
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.base.errors import UnreadableFile, require_library
 from fractalcontact.base.files import NETCDF_LOCK
 from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.units import UNITS, in_metres
@@ -47,8 +46,7 @@ def read_instrument(request: Request) -> FileContent:
     from importlib.metadata import version
 
     path, units, spacing = request.path, request.units, request.spacing
-    if importlib.util.find_spec("SurfaceTopography") is None:
-        raise MissingExtra(f"reading {path.name!r}", "SurfaceTopography", "io")
+    require_library(f"reading {path.name!r}", "SurfaceTopography", "io")
     # some of the readers open NetCDF files, and filters of warnings are shared by all threads
     with NETCDF_LOCK, _quiet() as messages, _files.open_bytes(path) as file:
         _files.check_unpacked(path.name, file)
@@ -179,9 +177,7 @@ def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, boo
         return np.ascontiguousarray(_observed(heights).T), bool(topography.is_periodic)
     heights = np.ma.getdata(values).astype(np.float64)  # without the mask of the library for infinite ones
     with Problems(WHERE, UnreadableFile) as problems:
-        infinite = int(np.count_nonzero(np.isinf(heights)))
-        expected = "finite heights, or NaN where missing"
-        problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
+        problems.not_infinite("path", heights)
     return np.ascontiguousarray(heights), bool(topography.is_periodic)
 
 
@@ -203,8 +199,7 @@ def _steps(
 def read_raster(request: Request) -> FileContent:
     """Read one band of a raster in projected coordinates."""
     path, channel, units, spacing = request.path, request.channel, request.units, request.spacing
-    if importlib.util.find_spec("rasterio") is None:
-        raise MissingExtra(f"reading {path.name!r}", "rasterio", "geo")
+    require_library(f"reading {path.name!r}", "rasterio", "geo")
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning
 

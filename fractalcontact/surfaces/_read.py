@@ -310,9 +310,8 @@ def _heights_content(values: Array, request: Request) -> FileContent:
     with Problems(WHERE, UnreadableFile) as problems:
         expected = f"the spacing in metres, which {request.path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
-        infinite = int(np.count_nonzero(np.isinf(values))) if values.dtype.kind == "f" else 0
-        expected = "finite heights, or NaN where missing"
-        problems.require(infinite == 0, "path", expected, f"{infinite} infinite")
+        if values.dtype.kind == "f":
+            problems.not_infinite("path", values)
         if not problems.messages:
             check_spacing(problems, check_heights(problems, values), spacing)
     heights = labelled_heights(from_bottom(values, request.first_row), spacing, units=request.units or "m")

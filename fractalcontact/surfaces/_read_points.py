@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import io
 import os
 import re
@@ -15,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import MissingExtra, UnreadableFile
+from fractalcontact.base.errors import MissingExtra, UnreadableFile, require_library
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.resources import require_unpacked, unpacked_limit
@@ -188,10 +187,7 @@ def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None)
         unknown = [unit for unit in stated if unit not in UNITS]
         if len(stated) == 1:
             problems.require(not unknown, "columns", "coordinates in a unit of length", unknown)
-        infinite = int(np.count_nonzero(np.isinf(table.values[:, chosen])))
-        problems.require(
-            infinite == 0, "path", "finite coordinates, or NaN where missing", f"{infinite} infinite"
-        )
+        problems.not_infinite("path", table.values[:, chosen], "coordinates")
     entries: dict[str, Any] = {"format": "list of points", "columns": chosen}
     if table.names:
         entries["columns"] = [table.names[k] for k in chosen]
@@ -234,8 +230,7 @@ def _place(names: list[str], group: Sequence[str]) -> int | None:
 
 def _mesh(path: Path, suffix: str) -> Points:
     """Read a mesh, or a cloud of points in the format of a mesh."""
-    if importlib.util.find_spec("trimesh") is None:
-        raise MissingExtra(f"reading {path.name!r}", "trimesh", "mesh")
+    require_library(f"reading {path.name!r}", "trimesh", "mesh")
     import trimesh
 
     with _files.corrupt_named(path.name, WHERE):
@@ -253,8 +248,7 @@ def _mesh(path: Path, suffix: str) -> Points:
 
 def _las(path: Path) -> Points:
     """Read a LAS or LAZ file; longitudes and latitudes are refused."""
-    if importlib.util.find_spec("laspy") is None:
-        raise MissingExtra(f"reading {path.name!r}", "laspy", "mesh")
+    require_library(f"reading {path.name!r}", "laspy", "mesh")
     import laspy
 
     if _files.file_suffix(path) == ".laz" and not laspy.LazBackend.detect_available():

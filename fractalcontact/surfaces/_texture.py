@@ -18,7 +18,10 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces._from_array import check_stack, height_stack, labelled_rows
 
 DECAY = 0.2  # of the autocorrelation at the lengths (ISO 25178-2, default of Sal and Str)
-
+NO_LENGTH = (
+    f"the autocorrelation does not fall to {DECAY} within half the surface in every direction, or all "
+    "heights are equal"
+)
 _LEAST = 8  # observed points: fewer have no curve of heights of which 40 % are a line
 _CORRELATION = ("autocorrelation_length", "texture_aspect_ratio")
 _CORE = (
@@ -42,6 +45,8 @@ def _check(problems: Problems) -> None:
     achieved_error="exact to rounding for the core; a hundredth of a spacing for the lengths",
     check=_check,
     memory=110.0,
+    reasons=dict.fromkeys(_CORRELATION, NO_LENGTH)
+    | dict.fromkeys(_CORE, f"fewer than {_LEAST} points were observed"),
 )
 def texture(surface: xr.DataArray) -> xr.Dataset:
     """Return the correlation lengths of a surface and the core of its height distribution (ISO 25178-2).
@@ -96,21 +101,9 @@ def texture(surface: xr.DataArray) -> xr.Dataset:
     rows = [_correlation(heights, grid.spacing, grid.periodic) + _core(heights) for heights in stack]
     names = (*_CORRELATION, *_CORE)
     result = labelled_rows(surface, [dict(zip(names, row, strict=True)) for row in rows])
-    for name, variable in result.data_vars.items():
-        if bool(np.isnan(variable).any()):
-            variable.attrs["reason"] = _reason(str(name), len(grid.shape))
+    if len(grid.shape) == 1:
+        result["texture_aspect_ratio"].attrs["reason"] = "a profile has one direction"
     return result
-
-
-def _reason(name: str, axes: int) -> str:
-    if name == "texture_aspect_ratio" and axes == 1:
-        return "a profile has one direction"
-    if name in _CORRELATION:
-        return (
-            f"the autocorrelation does not fall to {DECAY} within half the surface in every direction, or "
-            "all heights are equal"
-        )
-    return f"fewer than {_LEAST} points were observed"
 
 
 def _correlation(
