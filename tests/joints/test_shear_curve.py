@@ -64,6 +64,13 @@ def test_damage_coefficient_divides_the_dilation_only(surface):
     np.testing.assert_array_equal(strong.shear_stress, weak.shear_stress)
 
 
+def test_damage_coefficient_is_at_least_one(surface):
+    """0.7 + 10 / (12 log10(JCS / sigma)) is .87 at a hundred thousandth of the wall strength."""
+    default, least = (curve(surface, 1e-3, 1e-5 * 100 * MPA, damage_coefficient=m) for m in (None, 1))
+    np.testing.assert_array_equal(default.dilatancy_angle, least.dilatancy_angle)
+    assert default.dilatancy_angle.item() > 10
+
+
 def test_spring_raises_the_normal_stress_with_the_dilation(surface):
     stiffness = 1e9
     result = curve(surface, np.linspace(0, 4e-3, 41), [MPA, 5 * MPA], normal_stiffness=stiffness)

@@ -214,6 +214,18 @@ def test_asperity_angle_is_the_mean_dip_towards_the_shear(make_face):
         fc.joints.strength_envelope(teeth, **options | {"basic_friction_angle": 50})
 
 
+@pytest.mark.parametrize(("rise", "inside"), [(7, False), (9, True), (11, True), (13, False)])
+def test_xia_is_in_range_for_four_to_six_tenths_of_facing_area(make_face, rise, inside):
+    x = np.arange(401) % 20
+    teeth = make_face(1e-3 * np.where(x < rise, x / rise, (20 - x) / (20 - rise)) * np.ones((5, 1)), 1e-3)
+    assert strength(teeth, "xia", [1.0], direction="E")[1].tolist() == [inside]
+
+
+def test_barton_is_in_range_from_a_hundredth_to_three_tenths_of_the_wall_strength(surface):
+    _, inside = strength(surface, "barton_choubey", [0.9, 1.1, 29, 31])
+    assert inside.tolist() == [False, True, True, False]
+
+
 def test_roughness_beyond_the_scale_is_out_of_range(make_face, rough):
     steep = make_face(2e-3 * rough((64, 64), 3), 1e-4)
     result = fc.joints.strength_envelope(
