@@ -93,6 +93,9 @@ def test_edges_of_a_small_mask():
     np.testing.assert_array_equal(contact_edges(mask, (True, True)), [4, 4])
     stack = np.stack([mask, ~mask, np.zeros((3, 3), bool)])
     np.testing.assert_array_equal(contact_edges(stack), [[3, 2], [3, 2], [0, 0]])
+    two = np.array([[True, False]])  # neighbours on both sides of each, across the edge too
+    np.testing.assert_array_equal(contact_edges(two, (True, True)), [0, 2])
+    np.testing.assert_array_equal(contact_edges(two[:, :1], (True, True)), [0, 0])
 
 
 @pytest.mark.parametrize("size", [5e-324, 1e-310, 1e-150, 1e150, 1e300])
