@@ -10,8 +10,9 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -118,24 +119,33 @@ def report(
         is_free = not target.is_file() or is_report(target)
         problems.require(is_free, "path", "a new file, or a report of this package", target.name)
     with writing(WHERE, "path", target), tempfile.TemporaryDirectory() as folder:
-        pictures: Sequence[str | os.PathLike[str]] | None = figures
-        if pictures is None:
+        files: Sequence[str | os.PathLike[str]] | None = figures
+        if files is None:
             from fractalcontact import plotting  # only here: `run` has drawn them
 
-            pictures = plotting.draw(pictured(tree), folder, figures=OWN_FIGURES)
-        return write_report(tree, target, pictures, summary_of(tree))
+            files = plotting.draw(pictured(tree), folder, figures=OWN_FIGURES)
+        with pictures_of(files) as pictures:
+            return write_report(tree, target, pictures, summary_of(tree))
+
+
+@contextmanager
+def pictures_of(figures: Sequence[str | os.PathLike[str]]) -> Iterator[Iterator[tuple[str, bytes]]]:
+    """Provide names and contents of pictures for `write_report`, which threads encode within this context.
+
+    The encoder releases the interpreter lock.
+    """
+    with ThreadPoolExecutor(thread_count()) as pool:
+        yield pool.map(_picture_file, map(Path, figures))
 
 
 def write_report(
     tree: xr.DataTree,
     target: Path,
-    figures: Sequence[str | os.PathLike[str]],
+    pictures: Iterable[tuple[str, bytes]],
     summary: Summary,
     contents: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write the report with these pictures, this summary and the `page_contents`, computed if not given."""
-    with ThreadPoolExecutor(thread_count()) as pool:  # the encoder releases the interpreter lock
-        pictures = list(pool.map(_picture_file, map(Path, figures)))
     text = _page(tree, pictures, summary, contents or page_contents(tree), target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(target) as temporary:
@@ -163,7 +173,7 @@ def page_contents(tree: xr.DataTree) -> dict[str, Any]:
 
 def _page(
     tree: xr.DataTree,
-    figures: Sequence[tuple[str, bytes]],
+    figures: Iterable[tuple[str, bytes]],
     summary: Summary,
     contents: Mapping[str, Any],
     target: Path,

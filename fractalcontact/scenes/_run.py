@@ -28,7 +28,7 @@ from fractalcontact.scenes import _results_folder
 from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._export import tables
-from fractalcontact.scenes._html_report import page_contents, write_report
+from fractalcontact.scenes._html_report import page_contents, pictures_of, write_report
 from fractalcontact.scenes._inputs import read_surface
 from fractalcontact.scenes._result_tree import OVERVIEW, note_run_time, pictured, pooled, result_tree
 from fractalcontact.scenes._results_folder import SCANS, PartStore, with_seeds
@@ -166,8 +166,9 @@ def _run_scans(
             is_drawn = scene.want.figures and studies.numbers
             figures = _draw(pictured(tree), folder, progress) if is_drawn else []
             _results_folder.remove_old_figures(folder, figures)
-            whole = summary_of(tree)
-            write_report(tree, folder / _results_folder.REPORT, figures, whole)
+            with pictures_of(figures) as pictures:
+                whole = summary_of(tree)
+                write_report(tree, folder / _results_folder.REPORT, pictures, whole)
         PartStore(folder).clear()  # of marks for workers; each scan has its own parts
         failed = sum(map(bool, studies.reasons.values()))
         if failed:
@@ -233,7 +234,7 @@ def _run(
     # a copy of this process prepares the page meanwhile
     results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
     figures, contents = results[0], results[1]
-    with _beside_the_result():
+    with _beside_the_result(), pictures_of(figures) as pictures:
         if scene.want.figures:
             note_run_time(tree, start)
             _results_folder.remove_old_figures(folder, figures)
@@ -241,7 +242,7 @@ def _run(
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         netcdf.replace_attributes(folder / RESULT, changed)
-        write_report(tree, folder / _results_folder.REPORT, figures, whole, contents)
+        write_report(tree, folder / _results_folder.REPORT, pictures, whole, contents)
         if scene.want.datasheet and not study.failures:
             tables(tree, folder / _results_folder.TABLES)
             _draw_datasheet(tree, folder / _results_folder.DATASHEET)
