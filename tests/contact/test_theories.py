@@ -318,3 +318,10 @@ def test_long_summits_keep_their_hertz(exponent):
         fc.surfaces.from_array(heights, 5e-5), contact_modulus=1e9, nominal_pressure=[1e-9]
     ).sel(theory="hertz")
     assert float(result["contact_fraction"][0]) > 0
+
+
+@pytest.mark.parametrize("name", ["greenwood_williamson", "bush_gibson_thomas"])
+def test_asperities_hold_up_to_a_twentieth_of_the_area(name):
+    found = theories(rough(), MODULUS * np.linspace(5e-4, 5e-3, 200)).contact_fraction.sel(theory=name)
+    assert 0.049 < float(found.max()) <= 0.05
+    assert found.isnull().any()

@@ -121,11 +121,12 @@ def test_table_has_the_wanted_columns():
 def test_of_millions_of_islands_only_the_cells_are_measured():
     cells = np.zeros((4100, 4100), bool)
     cells[::2, ::2] = True  # 2050^2 islands, more than 2^22
-    few = fc.domains.islands(as_mask(cells), keep=())
+    mask = as_mask(cells, (1.0, 1.0), (True, True))
+    few = fc.domains.islands(mask, keep=())
     assert set(few.data_vars) & set(TABLE) == {"cells", "area"}
     assert "name the columns" in few.n_islands.comment
     assert (few.cells == 1).all()
-    more = fc.domains.islands(as_mask(cells), keep=(), include=["perimeter"])
+    more = fc.domains.islands(mask, keep=(), include=["perimeter"])
     assert (more.perimeter == 4).all()
     assert "comment" not in more.n_islands.attrs
 
