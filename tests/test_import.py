@@ -18,6 +18,7 @@ DONE = {
     "import fractalcontact.plotting, fractalcontact.domains": HEAVY,
     "fractalcontact.dimensions.methods()": HEAVY,
     "import fractalcontact.joints": HEAVY,
+    "import fractalcontact.base.file_contents": HEAVY,  # of `fractalcontact info`
     "[getattr(surfaces, name) for name in surfaces.__all__ if name != 'from_points']": SLOW
     | {"SurfaceTopography"},
     "fractalcontact.plotting.draw, fractalcontact.plotting.surface": {"numba", "matplotlib"},
