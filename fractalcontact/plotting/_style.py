@@ -267,16 +267,23 @@ def needs_log_axis(values: Any, ratio: float = 30.0) -> bool:
 
 
 def plain_ticks(ax: Axes) -> None:
-    """Label logarithmic axes with plain numbers (0.1, 1, 10), at least two of them where possible."""
+    """Label logarithmic axes with plain numbers (0.1, 1, 10), at least two of them where possible.
+
+    Where there is room for powers of ten alone, two small ticks stand between them, at 2 and 5: the eight of
+    matplotlib took a tenth of the time of a figure.
+    """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for axis in (ax.xaxis, ax.yaxis):
         if axis.get_scale() != "log":
             continue
         low, high = sorted(ax.get_xlim() if axis is ax.xaxis else ax.get_ylim())  # of all curves so far
+        narrow = high / low < 120  # two decades, with margins, have room for 1, 2 and 5 of each
+        if not narrow:
+            axis.set_minor_locator(LogLocator(subs=(2.0, 5.0), numticks=12))
+            axis.set_minor_formatter(NullFormatter())
         if low < 1e-3 or high > 1e6:
             continue  # powers of ten are easier to read there
-        narrow = high / low < 120  # two decades, with margins, have room for 1, 2 and 5 of each
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,), numticks=12))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axis.set_minor_formatter(NullFormatter())

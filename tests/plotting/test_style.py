@@ -109,6 +109,16 @@ def test_size_of_text_is_that_of_the_style(study, size):
         assert ax.figure.get_size_inches()[0] == pytest.approx(5.2 * size / 9.0)
 
 
+def test_logarithmic_axes_have_small_ticks_at_two_and_five():
+    lag = np.geomspace(1e-4, 1.0, 9)  # m: four decades; of the variogram nine
+    curve = xr.Dataset({"variogram": ("lag", 1e-3 * lag**2.25)}, {"lag": lag})
+    upper = plotting.dimension_curves(curve)[0, 0]
+    for axis in (upper.xaxis, upper.yaxis):
+        ticks = np.log10(axis.get_minorticklocs())
+        assert set(np.round(10 ** (ticks - np.floor(ticks + 1e-9)), 6)) == {2.0, 5.0}
+        assert ticks.size >= 2 * (np.ptp(np.log10(axis.get_view_interval())) - 1)
+
+
 def test_no_setting_is_left_changed(study, tmp_path):
     before = dict(plt.rcParams)
     plotting.draw(xr.DataTree.from_dict({"/dimensions": study["dimensions"].to_dataset()}), tmp_path)
