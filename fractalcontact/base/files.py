@@ -6,7 +6,6 @@ Nothing here needs NumPy, so that the command starts fast.
 from __future__ import annotations
 
 import os
-import platform
 import re
 import sys
 import threading
@@ -183,6 +182,8 @@ def clear_partial(folder: Path) -> None:
 
 def _machine() -> str:
     """Return the name of this machine: process numbers of machines that share a folder may coincide."""
+    import platform  # loads slowly, and the command does without
+
     return "".join(letter for letter in platform.node() if letter.isalnum() or letter == "-") or "here"
 
 

@@ -18,9 +18,10 @@ from xarray.indexes import PandasMultiIndex
 
 from fractalcontact.base.errors import InvalidInput, ScaleWarning, warn
 from fractalcontact.base.grid import METRES, plane_coords
+from fractalcontact.base.numbers import float_array
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.units import UNITS, in_metres
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 
 SURFACE, SPACING = "surface", "spacing"
 MASK, VALID = "mask", "valid"

@@ -31,7 +31,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from fractalcontact.base.errors import InvalidInput, TooLittleMemory, UnreadableFile
-from fractalcontact.base.numbers import float_array as float_array  # converts what `numbers` has passed
 from fractalcontact.base.numbers import is_real, number_of_axes, real_numbers
 
 if TYPE_CHECKING:

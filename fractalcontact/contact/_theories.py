@@ -12,10 +12,10 @@ from scipy import optimize, special
 
 from fractalcontact.base import spectra
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import detrended, shifted
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, float_array
+from fractalcontact.base.validation import Problems
 from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
 
 THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas", "hertz")
