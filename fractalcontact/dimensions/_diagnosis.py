@@ -16,19 +16,6 @@ from fractalcontact.dimensions._surface_input import Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_LINEAR = 0.01  # share of heights exactly on a line with their neighbours; measured heights have none
-_SPIKE = 20.0  # standard deviations: 1e8 Gaussian second differences reach 5.7, a scanned rock face 15
-_SPIKED = 0.1  # share of the squared second differences below which noise and misfit describe them
-# of the logarithm of a line of increments, over the range of the middle half of all: 6 standard deviations;
-# 5.3 was the most of 750 exact surfaces, H .1 to .9
-_SEAM = 4.45
-_BESIDE = 4.5  # z of the heights beside gaps: 1 of 1e5 surfaces
-_FEWEST_GAPS = 12  # the scatter of their means is then known to a fifth
-_WHOLE = 0.02  # of a step: distance of rounded heights from whole steps, after a change of unit
-_DISTINCT = 0.5  # share of distinct heights beyond which they are not rounded
-_BLOCKS = 8  # along each axis, in which roughness is compared, and parts of each block along each axis
-_PARTS = 4  # the scatter within a block has 15 degrees of freedom
-
 
 def diagnose(surface: Surface) -> str:
     """Return why no interval holds for a surface, and what to do; empty where nothing was found."""
@@ -42,9 +29,12 @@ def diagnose(surface: Surface) -> str:
     )
 
 
-def resampling(surface: Surface) -> str:
-    """Return that points were interpolated or repeated; empty where they were not."""
-    if surface.linear_share > _LINEAR:
+def resampling(surface: Surface, linear: float = 0.01) -> str:
+    """Return that points were interpolated or repeated; empty where they were not.
+
+    `linear`: share of heights exactly on a line with their neighbours; measured heights have none.
+    """
+    if surface.linear_share > linear:
         return (
             "many heights lie exactly on lines between their neighbours: they were interpolated; "
             "grid the points with "
@@ -59,10 +49,14 @@ def resampling(surface: Surface) -> str:
     return ""
 
 
-def rounding_step(surface: Surface, *, rows: int = 16, sample: int = 4096) -> float:
+def rounding_step(
+    surface: Surface, *, rows: int = 16, sample: int = 4096, whole: float = 0.02, distinct: float = 0.5
+) -> float:
     """Return the step to which scaled heights were rounded; 0 where none is seen in a sample of some rows.
 
-    Second differences are multiples of it, also once a plane was subtracted.
+    Second differences are multiples of it, also once a plane was subtracted. `whole`: of a step, distance
+    of rounded heights from whole steps after a change of unit. `distinct`: share of distinct second
+    differences beyond which heights are not rounded.
     """
     lines = surface.heights[:: max(1, surface.shape[0] // rows)]
     bends = np.diff(lines[:, :: -(-lines.size // sample)], 2, axis=1)
@@ -70,39 +64,40 @@ def rounding_step(surface: Surface, *, rows: int = 16, sample: int = 4096) -> fl
     rounding = 64.0 * np.spacing(float(np.nanmax(np.abs(lines), initial=0.0)))  # of the numbers themselves
     levels = np.unique(observed)
     levels = levels[np.diff(levels, prepend=-np.inf) > rounding]
-    if observed.size < 8 or not 2 <= levels.size <= _DISTINCT * observed.size:
+    if observed.size < 8 or not 2 <= levels.size <= distinct * observed.size:
         return 0.0
     gaps = np.diff(levels)
-    step = float(gaps[gaps > _WHOLE * np.median(gaps)].min())
+    step = float(gaps[gaps > whole * np.median(gaps)].min())
     multiples = (levels - levels[0]) / step
-    return step if np.abs(multiples - np.rint(multiples)).max() <= _WHOLE else 0.0
+    return step if np.abs(multiples - np.rint(multiples)).max() <= whole else 0.0
 
 
-def unevenness(heights: Array) -> float:
+def unevenness(heights: Array, blocks: int = 8, parts: int = 4) -> float:
     """Return by how much the roughness scatters between blocks more than within them, at least 1.
 
-    The variances of the exponent grow by this factor. Blocks hold 4 x 4 parts; where roughness is even, the
-    variance of their mean square second difference is a sixteenth of that of the parts.
+    The variances of the exponent grow by this factor. There are up to 8 x 8 `blocks`, of 4 x 4 `parts` each:
+    the scatter within a block has 15 degrees of freedom. Where roughness is even, the variance of the mean
+    square second difference of blocks is a sixteenth of that of the parts.
     """
     shape = (
         (1, heights.shape[1] - 2) if heights.shape[0] == 1 else (heights.shape[0] - 1, heights.shape[1] - 1)
     )
-    edges = [max(1, n // (_BLOCKS * _PARTS)) for n in shape]
-    counts = [n // edge // _PARTS * _PARTS for n, edge in zip(shape, edges, strict=True)]
-    if min(count for count, n in zip(counts, shape, strict=True) if n > 1) < 2 * _PARTS:
+    edges = [max(1, n // (blocks * parts)) for n in shape]
+    counts = [n // edge // parts * parts for n, edge in zip(shape, edges, strict=True)]
+    if min(count for count, n in zip(counts, shape, strict=True) if n > 1) < 2 * parts:
         return 1.0
-    steps = [_PARTS if count else 1 for count in counts]
+    steps = [parts if count else 1 for count in counts]
     ny, nx = (max(count, 1) for count in counts)
     means, number = np.zeros((ny, nx)), np.zeros((ny, nx), dtype=int)
     for row, squares in zip(range(ny), _squared_bends(heights, edges[0]), strict=False):
-        parts = squares[:, : nx * edges[1]].reshape(edges[0], nx, edges[1])
-        number[row] = np.count_nonzero(np.isfinite(parts), axis=(0, 2))
-        means[row] = np.nansum(parts, axis=(0, 2)) / np.maximum(number[row], 1)
+        part = squares[:, : nx * edges[1]].reshape(edges[0], nx, edges[1])
+        number[row] = np.count_nonzero(np.isfinite(part), axis=(0, 2))
+        means[row] = np.nansum(part, axis=(0, 2)) / np.maximum(number[row], 1)
     if number.min() == 0 or means.mean() == 0.0:
         return 1.0
-    blocks = means.reshape(ny // steps[0], steps[0], nx // steps[1], steps[1])
-    within = float(np.mean(blocks.var(axis=(1, 3), ddof=1)))
-    between = float(np.var(blocks.mean(axis=(1, 3)), ddof=1)) * steps[0] * steps[1]
+    by_block = means.reshape(ny // steps[0], steps[0], nx // steps[1], steps[1])
+    within = float(np.mean(by_block.var(axis=(1, 3), ddof=1)))
+    between = float(np.var(by_block.mean(axis=(1, 3)), ddof=1)) * steps[0] * steps[1]
     return max(1.0, between / within - 1.0) if within > 0.0 else 1.0
 
 
@@ -118,10 +113,12 @@ def _squared_bends(heights: Array, rows: int = 32) -> Iterator[Array]:
         yield np.square(bends, out=bends)
 
 
-def _spikes(heights: Array, known: int = 1 << 20) -> str:
+def _spikes(heights: Array, known: int = 1 << 20, spike: float = 20.0, spiked: float = 0.1) -> str:
     """Look for squared differences beyond those of a Gaussian surface.
 
-    The quantile of some `known` ones scatters by .2 %.
+    The quantile of some `known` ones scatters by .2 %. `spike`: standard deviations; 1e8 Gaussian second
+    differences reach 5.7, a scanned rock face 15. `spiked`: share of their squares below which noise and
+    misfit describe them.
     """
     step = -(-heights.size // known)
     sample = np.concatenate([squares.ravel()[::step] for squares in _squared_bends(heights)])
@@ -130,24 +127,25 @@ def _spikes(heights: Array, known: int = 1 << 20) -> str:
         return ""
     # 90 % quantile of chi square over its mean: smooth patches do not move it
     typical = float(np.quantile(sample, 0.9)) / 2.706
-    number, spiked, total = 0, 0.0, 0.0
+    number, above, total = 0, 0.0, 0.0
     for squares in _squared_bends(heights):
-        high = squares[squares > _SPIKE**2 * typical]
-        number, spiked, total = number + high.size, spiked + high.sum(), total + np.nansum(squares)
-    if typical == 0.0 or spiked < _SPIKED * total:
+        high = squares[squares > spike**2 * typical]
+        number, above, total = number + high.size, above + high.sum(), total + np.nansum(squares)
+    if typical == 0.0 or above < spiked * total:
         return ""
     return (
-        f"{number} heights stand out of their neighbours by more than {_SPIKE:.0f} standard "
+        f"{number} heights stand out of their neighbours by more than {spike:.0f} standard "
         f"deviations: spikes or "
         "steps; see fractalcontact.surfaces.despike"
     )
 
 
-def _seams(heights: Array, step: float, points: int = 512) -> str:
+def _seams(heights: Array, step: float, points: int = 512, seam: float = 4.45) -> str:
     """Look for lines along an axis across which heights differ more than across all others.
 
     Heights were rounded to `step`, which is spread evenly again. The median of some `points` of a line
-    scatters by 7 %; a seam doubles it.
+    scatters by 7 %; a seam doubles it. `seam`: of the logarithm, over the range of the middle half of all
+    lines, six standard deviations; 5.3 was the most of 750 exact surfaces, H .1 to .9.
     """
     if min(heights.shape) < 16 or np.isnan(heights.min()):
         return ""
@@ -160,7 +158,7 @@ def _seams(heights: Array, step: float, points: int = 512) -> str:
         if not squares.min() > 0.0:
             continue
         low, middle, high = np.quantile(np.log(squares), (0.25, 0.5, 0.75))
-        number = int(np.sum(np.log(squares) - middle > _SEAM * (high - low)))
+        number = int(np.sum(np.log(squares) - middle > seam * (high - low)))
         if number > 0:
             return (
                 f"heights jump between {name} at {number} places, as at seams of tiles: analyse the "
@@ -170,10 +168,11 @@ def _seams(heights: Array, step: float, points: int = 512) -> str:
     return ""
 
 
-def _missing_extremes(heights: Array, edge: int = 15) -> str:
+def _missing_extremes(heights: Array, edge: int = 15, fewest: int = 12, beside: float = 4.5) -> str:
     """Look for gaps whose neighbours lie to one side of their surroundings: valleys or peaks are missing.
 
-    `edge`: points along an edge of the surroundings.
+    `edge`: points along an edge of the surroundings. `fewest`: gaps; the scatter of their means is then known
+    to a fifth. `beside`: z, of 1 in 1e5 surfaces.
     """
     from scipy.ndimage import grey_dilation, label, mean, uniform_filter
 
@@ -186,14 +185,14 @@ def _missing_extremes(heights: Array, edge: int = 15) -> str:
         is_inner[border] = False
     owner = np.where(observed, grey_dilation(np.where(is_inner[gaps], gaps, 0), (3, 3)), 0)
     numbers = np.unique(owner)[1:]
-    if numbers.size < _FEWEST_GAPS:
+    if numbers.size < fewest:
         return ""
     around = uniform_filter(np.where(observed, heights, 0.0), edge)
     around /= np.maximum(uniform_filter(observed.astype(float), edge), 1e-6)
     deviation = np.where(observed, heights - around, 0.0)
     means = np.asarray(mean(deviation, owner, numbers))
     z = float(means.mean() / (means.std(ddof=1) / np.sqrt(numbers.size)))
-    if not abs(z) > _BESIDE:
+    if not abs(z) > beside:
         return ""
     which = "low" if z < 0 else "high"
     return (

@@ -63,9 +63,7 @@ NO_MODES = (
 )
 WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
 _SEEN = 0.8  # probability from which on a nuisance is named
-_NOISE_ROUNDS = 2  # of the amplitude, by which known noise is divided: it changes by less than 1 % in a third
 _EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
-_ROUNDS = 1  # corrections for a stretch and gaps; a second one moved no rms error by more than .0005
 
 
 @dataclass(frozen=True)
@@ -141,18 +139,20 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     options: dict[str, Any] = {"spread": spread, "background": background, "is_window": window is not None}
     options["pilot_spread"] = float(fit.theta[SPREAD]) if spread is None else 0.0
     found = posterior(bins, **options)
-    # the model counts noise in increments of the fractal without its blur, whose amplitude is fitted
-    for _ in range(0 if noise is None else _NOISE_ROUNDS):
+    # the model counts noise in increments of the fractal without its blur, whose amplitude is fitted: it
+    # changes by less than 1 % in a third round
+    for _ in range(0 if noise is None else 2):
         relative = (noise or 0.0) / unit / math.sqrt(_amplitude(bins, found))
         found = posterior(bins, noise=relative, **options)
     estimate = _estimate(surface, fit, bins, found, window, unit, noise, psf)
     return replace(estimate, note=joined(marks, estimate.note))
 
 
-def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | None:
+def fitted_modes(surface: Surface, spread: float | None = None, corrections: int = 1) -> ModeFit | None:
     """Return the modes of a surface and their first fit; None if it has too few.
 
-    `spread` is that of a known blur, in spacings.
+    `spread` is that of a known blur, in spacings. `corrections` for a stretch and gaps: a second one moved no
+    rms error by more than .0005.
     """
     heights = _without_rim(surface.heights)
     observed = np.isfinite(heights)
@@ -172,7 +172,7 @@ def fitted_modes(surface: Surface, spread: float | None = None) -> ModeFit | Non
     modes = lattice.power(filled)
     correction: Array | float = 1.0
     information: Array | float = 1.0
-    for rounds in range(_ROUNDS, -1, -1):
+    for rounds in range(corrections, -1, -1):
         pilot, clean = (expected_power(lattice, theta, form, edges=edges) for edges in (True, False))
         sharp = theta.copy()
         sharp[SPREAD] = 0.0

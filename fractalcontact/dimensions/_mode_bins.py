@@ -30,20 +30,14 @@ PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
 LEAST_BINS = 3  # an amplitude, an exponent, and one that can contradict them
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
-_SIMULATED = 1 << 18  # modes, of eight surfaces at most: the correction scatters by a fifth of the error of H
 # Of a table: modes of a bin, step of `spread_nodes`; of a first fit, and of the posterior. Near the axes the
 # power of a blur ends at that of the edges, where a cubic needs short steps: with the first pair it is off by
 # 7 % (1024 x 1024 points: chi square of 235, with the second .6; for another form than the pilot 18, 1.6)
 _SAMPLES, _SPREAD_STEPS = (64, 256), (0.25, 0.1)
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
-_LEAK = 0.5  # share of the edges in the expected power from which on neighbouring modes are correlated
-_TAIL = 1e-3  # squared transfer function below which no form of a filter holds
 _ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
-_ISOTROPIC = math.pi / 3.0  # radians per point up to which they differ by less than 5 % for H above .1
 _FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
 _SECTORS = 9  # of azimuth, on a quarter of the plane; an odd number, so that no sector ends at the diagonal
-_STRETCH = math.log(8.0)  # largest stretch that is looked for
-_STRETCHES = 121  # steps of 3.5 %; in 128 x 128 points a stretch of 2 scatters by 5 %
 _OCTAVE = math.log(2.0)
 
 
@@ -61,10 +55,16 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
     return np.asarray(power)
 
 
-def clear_modes(total: Array, clean: Array, unblurred: Array) -> Array:
-    """Return the modes that neither the edges nor a filter dominate; see `expected_power`."""
+def clear_modes(
+    total: Array, clean: Array, unblurred: Array, *, leak: float = 0.5, lost: float = 1e-3
+) -> Array:
+    """Return the modes that neither the edges nor a filter dominate; see `expected_power`.
+
+    `leak`: share of the edges from which on neighbouring modes are correlated. `lost`: squared transfer
+    function below which no form of a filter holds.
+    """
     rows = zip(total, clean, unblurred, strict=True)
-    return np.array([(c >= (1.0 - _LEAK) * t) & (c > _TAIL * u) for t, c, u in rows])
+    return np.array([(c >= (1.0 - leak) * t) & (c > lost * u) for t, c, u in rows])
 
 
 def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array:
@@ -116,12 +116,21 @@ class Levels:
     columns: Array
 
 
-def stretch(lattice: Lattice, levels: Levels, unblurred: Array, *, information: float = 1.0) -> float:
+def stretch(
+    lattice: Lattice,
+    levels: Levels,
+    unblurred: Array,
+    *,
+    information: float = 1.0,
+    largest: float = 8.0,
+    number: int = 121,
+) -> float:
     """Return the stretch of the lattice, as the levels by azimuth show it.
 
     The power of waves of one length is (cos^2 + sin^2 / a^2)^(k / 2) of their azimuth, where `unblurred`, the
     expected power without a blur, has the slope k. The stretch a, even in its logarithm, has the least chi
-    square. The logarithm is shrunk as in `lay`. `information`: of a mode.
+    square. The logarithm is shrunk as in `lay`. `information`: of a mode. The `number` of stretches, up to
+    the `largest` both ways, makes steps of 3.5 %: in 128 x 128 points a stretch of 2 scatters by 5 %.
     """
     from scipy.special import chdtri
 
@@ -133,13 +142,13 @@ def stretch(lattice: Lattice, levels: Levels, unblurred: Array, *, information: 
     lnq -= lnq.mean()
     slope = lnq @ np.log(unblurred[levels.rows, levels.columns]) / (lnq @ lnq)
     azimuth = 0.5 * math.pi / _SECTORS * (np.arange(_SECTORS) + 0.5)
-    logarithms = np.r_[np.linspace(-_STRETCH, _STRETCH, _STRETCHES), math.log(lattice.stretch)]
+    logarithms = np.r_[np.linspace(-math.log(largest), math.log(largest), number), math.log(lattice.stretch)]
     squares = np.cos(azimuth) ** 2 + np.sin(azimuth) ** 2 * np.exp(-2.0 * logarithms[:, None])
     residual = level - 0.5 * slope * np.log(squares[:-1] / squares[-1])
     residual -= (residual @ weight / weight.sum())[:, None]
     square = np.square(residual) @ weight * information
     best = int(np.argmin(square))
-    gain = float(square[_STRETCHES // 2] - square[best])
+    gain = float(square[number // 2] - square[best])
     by_chance = float(chdtri(1, _FALSE_ALARM))
     return math.exp(logarithms[best] * (1.0 - by_chance / gain)) if gain > by_chance else 1.0
 
@@ -161,13 +170,18 @@ def lay(lattice: Lattice, levels: Levels) -> Array | float:
     return np.asarray(np.exp((1.0 - by_chance / square) * levels.level)[_sectors(y[:, None], x)])
 
 
-def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
-    """Return the levels of some modes; `ratio` is their power over that expected."""
+def levels_by_azimuth(
+    lattice: Lattice, ratio: Array, keep: Array, isotropic: float = math.pi / 3.0
+) -> Levels:
+    """Return the levels of some modes; `ratio` is their power over that expected.
+
+    Up to `isotropic` radians per point aliases differ by less than 5 % for H above .1.
+    """
     from scipy.special import digamma, polygamma
 
     y, x = lattice.wavenumbers
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
-    limit = _ISOTROPIC / max(lattice.spacing)
+    limit = isotropic / max(lattice.spacing)
     near_y, near_x = (np.flatnonzero(np.abs(along) < limit) for along in (y, x))
     is_near = np.hypot(y[near_y, None], x[near_x]) < limit
     rows, columns = np.nonzero(keep[np.ix_(near_y, near_x)] & is_near)
@@ -318,13 +332,18 @@ def filling_ratio(lattice: Lattice, pilot: Array, observed: Array) -> Array:
     return np.asarray(np.maximum(ratio, 1e-12)[classes.joined[classes.number]])
 
 
-def gaussian_surfaces(lattice: Lattice, pilot: Array) -> Iterator[tuple[Array, Array]]:
-    """Yield the modes and the heights of some Gaussian surfaces of the expected power `pilot`."""
+def gaussian_surfaces(
+    lattice: Lattice, pilot: Array, simulated: int = 1 << 18
+) -> Iterator[tuple[Array, Array]]:
+    """Yield the modes and the heights of some Gaussian surfaces of the expected power `pilot`.
+
+    With `simulated` modes, of eight surfaces at most, a correction scatters by a fifth of the error of H.
+    """
     stream = np.random.default_rng(1)
     inner = (slice(None), slice(1, None)) if lattice.axes == 1 else (slice(1, None), slice(1, None))
     axes = (1,) if lattice.axes == 1 else (0, 1)
     size = math.prod(lattice.shape[-lattice.axes :])
-    for _ in range(max(1, min(8, math.ceil(_SIMULATED / pilot.size)))):
+    for _ in range(max(1, min(8, math.ceil(simulated / pilot.size)))):
         modes = np.zeros(lattice.shape)
         modes[inner] = np.sqrt(pilot) * stream.standard_normal(pilot.shape)
         yield modes[inner], fft.dct(modes, 3, axes) / math.sqrt(2.0**lattice.axes * size)

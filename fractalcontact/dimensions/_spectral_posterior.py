@@ -59,19 +59,7 @@ _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
 # and .9 are .028, .041 and .061 wide with .1, .029 .042 .063 with .12, .032 .044 .065 with .15
 _BENT = 0.12
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
-_FOURTH = 0.1  # of (s q)^4: the fourth cumulant of a mean over a box has .125
-# probability that (1) holds without a process: with .8 exact intervals are as narrow as without sums
-_HOLDS = 0.8
-_UNCUT = 0.8  # probability that there is no cut: of 0.5 and 0.8 for both the narrower interval of a blur of 1
-_CUT = 0.5  # logarithm of the power that is off at a cut
-_LEFT = 2.5  # octaves between cuts, to tell an exponent from a corner
-_DEEPEST = 3.5  # octaves beyond a cut: filters of up to ten points, a levelled tenth of the extent
 _OCTAVE = math.log(2.0)
-
-_STARTS, _ATTEMPTS, _STEPS = 64, 5, 12
-_SAME = 1.0  # squared distance of maxima, in u, that are one: with .1 and 2 the same within 6 % of a width
-_FLAT = 1e3  # variance of ln A: two deviations are a factor of e^63
-_GRID, _ZOOMS, _NEGLIGIBLE = 2001, 5, 20.0  # of a product of densities: points, refinements, log density
 
 
 @dataclass(frozen=True)
@@ -181,18 +169,21 @@ class Posterior:
         )
 
 
-def joint_quantiles(posteriors: Sequence[Posterior], shares: Sequence[float]) -> list[float]:
+def joint_quantiles(
+    posteriors: Sequence[Posterior], shares: Sequence[float], points: int = 2001, zooms: int = 5
+) -> list[float]:
     """Return quantiles of the H that independent surfaces have in common, each with nuisances of its own.
 
-    Their product has the prior of u, the unit normal distribution, once.
+    Their product has the prior of u, the unit normal distribution, once. It is found at some `points`, which
+    come `zooms` times nearer to where its logarithm is within 20 of the highest.
     """
     from scipy.special import ndtr
 
     low, high = -8.0, 8.0
-    for _ in range(_ZOOMS):
-        u = np.linspace(low, high, _GRID)
+    for _ in range(zooms):
+        u = np.linspace(low, high, points)
         log = sum(each.log_density(u) for each in posteriors) + 0.5 * (len(posteriors) - 1) * np.square(u)
-        near = np.flatnonzero(log > log.max() - _NEGLIGIBLE)
+        near = np.flatnonzero(log > log.max() - 20.0)
         low, high = u[max(near[0] - 1, 0)], u[min(near[-1] + 1, u.size - 1)]
     density = np.exp(log - log.max())
     found = np.interp(np.asarray(shares) * density.sum(), np.cumsum(density) - 0.5 * density, u)
@@ -232,6 +223,7 @@ def posterior(
     pilot_spread: float = 0.0,
     is_pilot: bool = False,
     is_window: bool = False,
+    attempts: int = 5,
 ) -> Posterior:
     """Return the posterior of H.
 
@@ -248,6 +240,8 @@ def posterior(
         For a first estimate of the spectrum: with fewer kinds of discrepancy.
     is_window : bool
         The waves were chosen beforehand: without corners and cuts.
+    attempts : int
+        Maxima that are looked for without a discrepancy.
     """
     chosen = hypotheses(spread, noise, background)
     kinds = _discrepancies(bins, pilot_spread)
@@ -260,7 +254,7 @@ def posterior(
     ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, _PRIOR_SHARPNESS
     prior = np.array(ranges).T
     whitening, constants = zip(*(_whitening(kind, bins) for kind in kinds), strict=True)
-    of_kind = np.r_[np.zeros(_ATTEMPTS - 1, dtype=int), np.arange(len(kinds))]
+    of_kind = np.r_[np.zeros(attempts - 1, dtype=int), np.arange(len(kinds))]
     shape = len(chosen), of_kind.size
     evidence, centre, scale = np.full(shape, -np.inf), np.zeros(shape), np.ones(shape)
     theta = np.zeros((*shape, len(ranges)))
@@ -290,8 +284,36 @@ def posterior(
     return Posterior(share / share.sum(), centre, scale, theta, chosen, [kinds[k] for k in of_kind])
 
 
-def _discrepancies(bins: Bins, pilot_spread: float) -> list[Discrepancy]:
-    """Return the kinds of discrepancy with their prior probabilities, which sum to one."""
+def _discrepancies(
+    bins: Bins,
+    pilot_spread: float,
+    *,
+    holds: float = 0.8,
+    uncut: float = 0.8,
+    off: float = 0.5,
+    left: float = 2.5,
+    deepest: float = 3.5,
+    fourth_order: float = 0.1,
+) -> list[Discrepancy]:
+    """Return the kinds of discrepancy with their prior probabilities, which sum to one.
+
+    Parameters
+    ----------
+    bins : Bins
+    pilot_spread : float
+    holds : float
+        Probability that (1) holds without a process; with .8 exact intervals are as narrow as without sums.
+    uncut : float
+        Probability that there is no cut: of .5 and .8, for both, the narrower interval of a blur of 1.
+    off : float
+        Logarithm of the power that is off at a cut.
+    left : float
+        Octaves between cuts, to tell an exponent from a corner.
+    deepest : float
+        Octaves beyond a cut: filters of up to ten points, a levelled tenth of the extent.
+    fourth_order : float
+        Of (s q)^4: the fourth cumulant of a mean over a box has .125.
+    """
     octaves = bins.lnq / _OCTAVE
     everything = np.ones(octaves.size, dtype=bool)
     lowest, highest = float(octaves.min()), float(octaves.max())
@@ -299,36 +321,37 @@ def _discrepancies(bins: Bins, pilot_spread: float) -> list[Discrepancy]:
     # between rings of bins; those of one ring differ by less than a tenth of an octave
     ends = np.sort(octaves)
     ends = ends[np.flatnonzero(np.diff(ends) > 0.1)]
-    short_cuts = ends[ends > max(lowest + _LEFT, highest - _DEEPEST)]
-    cuts += [(_CUT * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
-    for cut in ends[ends < min(highest - _LEFT, lowest + _DEEPEST)][::2]:
-        cuts.append((_CUT * 4.0 ** (cut - octaves), octaves > cut))
+    short_cuts = ends[ends > max(lowest + left, highest - deepest)]
+    cuts += [(off * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
+    for cut in ends[ends < min(highest - left, lowest + deepest)][::2]:
+        cuts.append((off * 4.0 ** (cut - octaves), octaves > cut))
     cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
-    fourth = _FOURTH * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
-    uncut = _UNCUT if cuts else 1.0
+    fourth = fourth_order * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
+    whole = uncut if cuts else 1.0
     has_fourth = bool(fourth.max() > 0.01)
-    none = _HOLDS * (0.5 if has_fourth else 1.0)
-    kinds = [Discrepancy(np.zeros(octaves.size), everything, uncut * none)]
+    none = holds * (0.5 if has_fourth else 1.0)
+    kinds = [Discrepancy(np.zeros(octaves.size), everything, whole * none)]
     kinds += [
-        Discrepancy(np.full(octaves.size, tau), everything, uncut * (1.0 - _HOLDS) / len(_TAUS))
+        Discrepancy(np.full(octaves.size, tau), everything, whole * (1.0 - holds) / len(_TAUS))
         for tau in _TAUS
     ]
     if has_fourth:
-        kinds.append(Discrepancy(fourth, everything, uncut * none))
-    return kinds + [Discrepancy(scatter, inside, (1.0 - _UNCUT) / len(cuts)) for scatter, inside in cuts]
+        kinds.append(Discrepancy(fourth, everything, whole * none))
+    return kinds + [Discrepancy(scatter, inside, (1.0 - uncut) / len(cuts)) for scatter, inside in cuts]
 
 
-def _whitening(kind: Discrepancy, bins: Bins) -> tuple[Array, float]:
+def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e3) -> tuple[Array, float]:
     """Return the matrix that makes the bins of (2) white, zero for those that do not count, and its log
     density.
 
-    A bin beyond a cut has the expected logarithm of the density of a deviation of a factor of e.
+    A bin beyond a cut has the expected logarithm of the density of a deviation of a factor of e. `flat` is
+    the variance of ln A: two deviations are a factor of e^63.
     """
     octaves = bins.lnq / _OCTAVE
     inside = np.ix_(kind.inside, kind.inside)
     correlation = np.exp(-np.abs(octaves[:, None] - octaves))
     covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
-    lower = np.linalg.cholesky(covariance[inside] + _FLAT)
+    lower = np.linalg.cholesky(covariance[inside] + flat)
     whitening = np.zeros(covariance.shape)
     # above the diagonal the library leaves zeros or rounding, in one process not as in another
     whitening[inside] = np.tril(np.linalg.inv(lower))
@@ -338,7 +361,7 @@ def _whitening(kind: Discrepancy, bins: Bins) -> tuple[Array, float]:
 
 
 @lru_cache
-def _starting_points() -> Array:
+def _starting_points(number: int = 64) -> Array:
     """Return points that fill the prior evenly, up to 2 standard deviations.
 
     They are the multiples of g^-1 ... g^-6 modulo one, g^7 = g + 1 (Roberts 2018, quasirandom sequences).
@@ -349,7 +372,7 @@ def _starting_points() -> Array:
     for _ in range(40):
         root = (1.0 + root) ** (1.0 / 7.0)
     steps = root ** -np.arange(1.0, 7.0)
-    return np.asarray(ndtri(np.clip((0.5 + np.outer(np.arange(_STARTS), steps)) % 1.0, 0.02, 0.98)))
+    return np.asarray(ndtri(np.clip((0.5 + np.outer(np.arange(number), steps)) % 1.0, 0.02, 0.98)))
 
 
 # numba caches a kernel by its own file, so those that call each other stand in one
@@ -564,7 +587,7 @@ def _maxima(
 
     `kinds`: of discrepancy of each maximum; the first one has several, those of the others lie near its best.
     """
-    p, bins = fixed.shape[1], level.size
+    p, bins, steps = fixed.shape[1], level.size, 12
     values = np.empty(p)
     models = np.empty((starts.shape[0], bins))
     model, shifted, residual, trial_residual = np.empty(bins), np.empty(bins), np.empty(bins), np.empty(bins)
@@ -608,7 +631,7 @@ def _maxima(
                     _copy(trial, u)
                     _copy(shifted, model)
                     _copy(trial_residual, residual)
-            for _step in range(_STEPS):
+            for _step in range(steps):
                 for i in range(p):
                     for b in range(bins):
                         jacobian[i, b] = 0.0
@@ -661,7 +684,7 @@ def _maxima(
                 distance = 0.0
                 for i in range(p):
                     distance += (optima[other, i] - u[i]) ** 2
-                if distance < _SAME:
+                if distance < 1.0:  # one maximum: with .1 and 2 widths are the same within 6 %
                     evidence[m, c] = -math.inf
             if k > 0 or objective < best:
                 best = objective

@@ -31,17 +31,11 @@ SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
 MOST = 32  # sets of marks, and searches; more are a pattern
-NONE_LEFT = 1e-8  # of the mean square increment: the waves are the surface
-FEW, FEW_LEFT = 3, 0.05  # more sets of waves than this that leave less than this are the surface, too
 _LONGEST = {1: 7.0, 2: 4.0}  # least wavenumber tested, in steps, by number of axes: longer waves are the form
 _FIRST_RING = 2  # steps: longer waves are those of the trend
-_IN_RING = 24  # modes, at least, of which a level is the median: it scatters by 40 %
 _MARGIN = 12  # modes on either side of one that are compared with it
 _TAPER_REACH = 2  # modes on either side that a taper correlates with one
 _OF_LINE = 8.0  # independent modes of a line: with 12, waves in 9 of 80 surfaces with ridges, not in 4
-_OUTLYING = 8.0  # times the median of a line: stronger modes on it count as this, they may be multiples
-_WIDTHS = 0.5, 0.2, 0.08, 0.03  # modes between frequencies whose parabola has the largest power
-_ROUNDING = 1e-14  # of the strongest mode: the running sums of the boxes keep two digits beside it
 _NAMES = ("wavelength", "wave_azimuth", "wave_amplitude", "wave_p_value", "run_time", "wave")
 
 
@@ -139,11 +133,14 @@ class Wave:
         return np.asarray(np.outer(row.real, column.real) - np.outer(row.imag, column.imag))
 
 
-def without_waves(surface: Surface) -> tuple[Surface, str]:
+def without_waves(
+    surface: Surface, *, few: int = 3, few_left: float = 0.05, none_left: float = 1e-8
+) -> tuple[Surface, str]:
     """Return a surface without its single waves, and a note that names them; itself if it has none.
 
     Where little is left, or the wavelengths are in geometric progression, the waves are the surface itself,
-    as the terms of a Weierstrass function are.
+    as the terms of a Weierstrass function are. Little are `none_left` of the mean square increment, or
+    `few_left` beside more than a `few` sets of waves.
     """
     if min(surface.grid.shape) < SMALLEST or surface.is_constant or not surface.is_complete:
         return surface, ""
@@ -153,10 +150,10 @@ def without_waves(surface: Surface) -> tuple[Surface, str]:
     before = without_trend(surface.heights, plane=not all(surface.grid.periodic))
     left = _mean_square_increment(rest) / _mean_square_increment(before)
     sets = _sets(found, surface.shape)
-    if left < (FEW_LEFT if len(sets) > FEW else NONE_LEFT) or _is_progression(found):
+    if left < (few_left if len(sets) > few else none_left) or _is_progression(found, few):
         return surface, ""
-    named = ", ".join(map(_name, sets[:FEW]))
-    more = f" and {len(sets) - FEW} weaker ones" if len(sets) > FEW else ""
+    named = ", ".join(map(_name, sets[:few]))
+    more = f" and {len(sets) - few} weaker ones" if len(sets) > few else ""
     count = f"{len(sets)} single waves" if len(sets) > 1 else "a single wave"
     return surface.with_heights(rest), f"{count} removed: {named}{more}"
 
@@ -170,10 +167,10 @@ def _name(members: Sequence[Wave]) -> str:
     )
 
 
-def _is_progression(found: Sequence[Wave]) -> bool:
+def _is_progression(found: Sequence[Wave], few: int) -> bool:
     """Return whether more than a few wavelengths have one ratio from each to the next."""
     ratios = np.diff(np.log(np.sort([wave.wavelength for wave in found])))
-    return len(found) > FEW and bool(np.ptp(ratios) < 0.02 * ratios.mean())
+    return len(found) > few and bool(np.ptp(ratios) < 0.02 * ratios.mean())
 
 
 def _sets(found: Sequence[Wave], shape: tuple[int, ...], highest: int = 24) -> list[list[Wave]]:
@@ -245,7 +242,8 @@ def _fitted(heights: Array, start: Array, is_periodic: bool) -> tuple[Array, com
         return np.asarray(tapers[0] * np.exp(-2j * np.pi * np.outer(y, np.arange(heights.shape[0]))) @ right)
 
     cycles = np.array(start)
-    for width in () if is_periodic else _WIDTHS:
+    # modes between frequencies whose parabola has the largest power
+    for width in () if is_periodic else (0.5, 0.2, 0.08, 0.03):
         steps = [width / n * np.arange(-1.0, 2.0) if n > 1 else np.zeros(1) for n in heights.shape]
         logs = np.log(np.abs(modes(cycles[0] + steps[0], cycles[1] + steps[1])) + 1e-300)
         middle = logs.shape[0] // 2
@@ -322,12 +320,15 @@ class Search:
                 found.append((cycles, p_value))
         return found
 
-    def _ratio(self, power: Array) -> Array:
-        """Return modes over the level of their ring, with `_MARGIN` more columns on either side."""
+    def _ratio(self, power: Array, rounding: float = 1e-14) -> Array:
+        """Return modes over the level of their ring, with `_MARGIN` more columns on either side.
+
+        `rounding`: of the strongest mode; the running sums of the boxes keep two digits beside it.
+        """
         from scipy.ndimage import maximum_filter1d
 
         levels = np.array([np.median(ring) for ring in np.split(power.ravel()[self.order], self.ends)])
-        logs = np.log(np.maximum(levels / math.log(2.0), _ROUNDING * float(power.max())))
+        logs = np.log(np.maximum(levels / math.log(2.0), rounding * float(power.max())))
         # the level falls by half from ring to ring, at most: a band may end inside a ring
         logs = np.maximum(logs, maximum_filter1d(logs, 3) - math.log(2.0))
         ratio = power / np.exp(np.interp(self.log_q, self.log_ring, logs))
@@ -357,7 +358,10 @@ class Search:
 
 
 @lru_cache(maxsize=2)  # of a surface and its parts
-def _search(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: bool) -> Search:
+def _search(
+    shape: tuple[int, int], spacing: tuple[float, float], is_periodic: bool, in_ring: int = 24
+) -> Search:
+    """Prepare the search: rings have `in_ring` modes at least, whose median scatters by 40 %."""
     ny, nx = shape
     axes = 1 if ny == 1 else 2
     extent = min(n * d for n, d in zip(shape[-axes:], spacing[-axes:], strict=True))
@@ -367,7 +371,7 @@ def _search(shape: tuple[int, int], spacing: tuple[float, float], is_periodic: b
     step = np.rint(q).astype(np.int64)
     count = np.bincount(step.ravel())
     count[:_FIRST_RING] = 0
-    ring = np.where(step < _FIRST_RING, -1, (np.cumsum(count) // _IN_RING)[step]).ravel()
+    ring = np.where(step < _FIRST_RING, -1, (np.cumsum(count) // in_ring)[step]).ravel()
     order = np.argsort(ring, kind="stable")[np.count_nonzero(ring < 0) :]
     ends = np.flatnonzero(np.diff(ring[order])) + 1
     log_q = np.log(np.maximum(q, 1.0))
@@ -386,10 +390,11 @@ def _taper(n: int, is_periodic: bool) -> Array:
     return np.ones(n) if is_periodic or n == 1 else np.sin(np.pi * (np.arange(n) + 0.5) / n)
 
 
-def _line_level(ratio: Array, rows: Array, columns: Array) -> Array:
+def _line_level(ratio: Array, rows: Array, columns: Array, outlying: float = 8.0) -> Array:
     """Return the largest mean of the modes on lines through some modes, in many directions.
 
-    The ray of ridges that are drawn with steps is folded at two spacings, and keeps its direction.
+    The ray of ridges that are drawn with steps is folded at two spacings, and keeps its direction. Modes of
+    more than `outlying` times the median of a line count as that: they may be multiples.
     """
     ny = ratio.shape[0]
     number = 2 * _MARGIN if ny > 1 else 1  # at the ends of the lines they are 1.6 modes apart
@@ -402,7 +407,7 @@ def _line_level(ratio: Array, rows: Array, columns: Array) -> Array:
     for angle in angles:
         along_y, along_x = (np.rint(steps * f(angle)).astype(np.int64) for f in (np.sin, np.cos))
         modes = ratio[(rows[:, None] + along_y) % ny, columns[:, None] + along_x]
-        most = _OUTLYING * np.median(modes, axis=1, keepdims=True)
+        most = outlying * np.median(modes, axis=1, keepdims=True)
         np.maximum(level, np.minimum(modes, most).mean(axis=1), out=level)
     return level
 
