@@ -1,7 +1,8 @@
 """One valid call of every public function: its arguments, made anew for every call.
 
-Tests of what all functions have in common take it from here: labels, files, wrong arguments, missing numbers,
-threads and processes, damaged arguments. A new function needs one line in `CALLS`.
+Tests of what all functions have in common take it from here: labels, files, coordinates of the user's own,
+wrong arguments, missing numbers, threads and processes, damaged arguments. A new function needs one line in
+`CALLS`.
 """
 
 import functools
