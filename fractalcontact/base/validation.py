@@ -313,11 +313,9 @@ class Problems:
 
     def tree(self, argument: str, value: Any = GIVEN) -> bool:
         """Check for the DataTree of a study."""
-        import xarray as xr  # loads slowly
-
         expected = "a DataTree, from fractalcontact.scenes.run or fractalcontact.open"
         value = self._value(argument, value)
-        return self.require(isinstance(value, xr.DataTree), argument, expected, value)
+        return self.require(hasattr(value, "subtree"), argument, expected, value)
 
     def result(self, argument: str, value: Any = GIVEN) -> bool:
         """Check that a labelled result has the dims, types and units of the schema."""
