@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.numbers import Array
-from fractalcontact.contact._scaled_problem import sum_by_rows
+from fractalcontact.contact._problem import sum_by_rows
 
 
 def project_onto_capped_simplex(

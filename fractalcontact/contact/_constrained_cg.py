@@ -91,7 +91,7 @@ from fractalcontact.contact._capped_simplex import (
 )
 from fractalcontact.contact._operator import Operator, PeriodicOperator
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet, Preconditioner
-from fractalcontact.contact._scaled_problem import Control, Problem, Solution, strips, sum_by_rows
+from fractalcontact.contact._problem import Control, Problem, Solution, strips, sum_by_rows
 
 # 206 solutions on rough surfaces took 20 at most at a tolerance of 1e-10, and 3828 runs of the tests,
 # which have spikes that yield, 240 at most

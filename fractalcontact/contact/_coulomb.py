@@ -32,7 +32,6 @@ end one along the gradient (4 in 2352), took 3 % more transforms.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
@@ -335,11 +334,6 @@ def _clipped(y: Array, c: Array, bound: Array, force: Array) -> tuple[float, Arr
 def _products(a: Array, b: Array) -> Array:
     """Return a b^T, summed by numpy: the bits of a library product may depend on the number of threads."""
     return np.array([[np.sum(row * column) for column in b] for row in a])
-
-
-def empty_maps(names: Sequence[str], shape: tuple[int, ...]) -> dict[str, Array]:
-    """Return the maps named, without any contact."""
-    return {name: np.zeros(shape, np.int8 if name == "slip_state" else np.float64) for name in names}
 
 
 def shifted_start(last: CoulombState | None, starts: Array, bound: Array, unit: Array, force: Array) -> Array:

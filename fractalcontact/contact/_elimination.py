@@ -22,7 +22,7 @@ from scipy.linalg import solve as solve_dense
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.numbers import Array
-from fractalcontact.contact._scaled_problem import Control, Problem, Solution
+from fractalcontact.contact._problem import Control, Problem, Solution
 
 # of one step: each round removes a node at least, and a dozen are usual; a step that takes more is reported
 # as "iteration_limit"

@@ -19,10 +19,11 @@ import numpy as np
 from fractalcontact.base.grid import Grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact._flat_block import flat_block
-from fractalcontact.contact._options import ContactOptions, LoadPath
-from fractalcontact.contact._scaled_problem import (
+from fractalcontact.contact._problem import (
     Body,
+    ContactOptions,
     Control,
+    LoadPath,
     Problem,
     Solution,
     Units,
@@ -261,7 +262,7 @@ def flat_contact(problem: Problem, control: Control, tolerance: float) -> Soluti
     None where some nodes yield and others do not.
     """
     block = flat_block(problem.body)
-    stiffness = 1.0 / block.compliance if block.compliance > 0 else np.inf
+    stiffness = 1.0 / block.closure if block.closure > 0 else np.inf
     force = control.closure * stiffness if control.closure is not None else control.value
     if problem.body.periodic:
         # a periodic flat body has no compliance: a positive closure loads it to p_max, a force leaves the
@@ -271,16 +272,15 @@ def flat_contact(problem: Problem, control: Control, tolerance: float) -> Soluti
         return Solution(pressure, block.displacement, control.closure or 0.0, force, reason="converged")
     if block.pressure.max() * force > problem.p_max:
         return None
-    return Solution(
-        block.pressure * force,
-        block.displacement * force,
-        force / stiffness if control.closure is None else control.closure,
-        force,
-        block.iterations,
-        block.transforms,
-        block.residual,
-        reason="converged" if block.residual <= tolerance else block.stopped_by,
-        work=block.compliance * force * force,
+    missed = "rounding" if block.reason == "converged" else block.reason  # the block is solved to rounding
+    return replace(
+        block,
+        pressure=block.pressure * force,
+        displacement=block.displacement * force,
+        closure=force / stiffness if control.closure is None else control.closure,
+        force=force,
+        reason="converged" if block.residual <= tolerance else missed,
+        work=block.work * force * force,
     )
 
 

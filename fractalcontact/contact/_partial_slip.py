@@ -17,7 +17,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.contact._options import ContactOptions, LoadPath, check_problem
+from fractalcontact.contact._problem import ContactOptions, LoadPath, check_problem
 from fractalcontact.contact.solver import (
     Sheared,
     ShearPath,

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import in_bands
 from fractalcontact.contact._operator import PairSum, WavenumberMultiplier
-from fractalcontact.contact._scaled_problem import Body
+from fractalcontact.contact._problem import Body
 
 # The numbers here and of `bin_edge` and `padded_plane` are measured by the transforms of solutions at three
 # loads on rough surfaces of 128 x 128 nodes (tolerance 1e-8), periodic and free, over those with these values
@@ -53,24 +53,6 @@ class FreeSet:
     def empty(cls, plane: tuple[int, int], bin_shape: tuple[int, int], dtype: Any) -> FreeSet:
         """Return a set without nodes."""
         return cls(np.zeros(plane, np.bool_), np.zeros(bin_shape, dtype), np.zeros(bin_shape, dtype))
-
-
-class Preconditioner(Protocol):
-    """A preconditioner on a plane of `plane` nodes, in `bin_shape` bins of bin_rows x bin_columns nodes."""
-
-    plane_shape: tuple[int, int]
-    bin_rows: int
-    bin_columns: int
-    bin_shape: tuple[int, int]
-    transforms: int
-
-    def apply(self, x: Array, free_set: FreeSet) -> tuple[Array, Array]:
-        """Return the pressure for the gap x on a set, and what each bin adds to it on the set."""
-        ...
-
-    def summed_displacement(self, free_set: FreeSet) -> float | None:
-        """Return the summed displacement under unit pressure on the set; None where it is not needed."""
-        ...
 
 
 class ExtensionPreconditioner:
@@ -138,23 +120,6 @@ class ExtensionPreconditioner:
         own = self.self_compliance * count * (1.0 - count / size)
         return float(np.sum(np.sum(counts * displacement, axis=1), dtype=np.float64)) + own
 
-    def apply_to_all(self, gap: Array) -> Array:
-        """Return the pressure for a gap on a body whose nodes are all free."""
-        ny, nx = gap.shape
-        free_set = FreeSet.empty(self.plane_shape, self.bin_shape, self.dtype)
-        free_set.mask[:ny, :nx] = True
-        x = np.zeros(self.plane_shape, dtype=self.dtype)
-        x[:ny, :nx] = gap
-        shape = (self.bin_shape[0], self.bin_rows, self.bin_shape[1], self.bin_columns)
-        padded = np.zeros((shape[0] * shape[1], shape[2] * shape[3]), dtype=self.dtype)
-        padded[:ny, :nx] = gap
-        free_set.bin_sums[...] = padded.reshape(shape).sum(axis=(1, 3))
-        padded[:ny, :nx] = 1
-        free_set.bin_counts[...] = padded.reshape(shape).sum(axis=(1, 3))
-        pressure, extra = self.apply(x, free_set)
-        per_node = np.repeat(np.repeat(extra, self.bin_rows, axis=0), self.bin_columns, axis=1)
-        return np.asarray(pressure[:ny, :nx] + per_node[:ny, :nx])
-
 
 class NodePreconditioner:
     """|q|/2 between the nodes of a set, without extension: contacts this small are nearly separate."""
@@ -186,6 +151,7 @@ def bin_tables(bin_shape: tuple[int, int], edge: tuple[float, float], dtype: str
 
 
 kept_bin_tables = lru_cache(maxsize=32)(bin_tables)
+Preconditioner = ExtensionPreconditioner | NodePreconditioner
 
 
 def stiffness_table(body: Body) -> Array:

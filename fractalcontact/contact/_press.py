@@ -16,7 +16,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.contact._options import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
+from fractalcontact.contact._problem import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
 from fractalcontact.contact.solver import (
     PRESSURE_CLASSES,
     Pressed,

@@ -37,7 +37,7 @@ from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.schema import SLIP, STICK
 from fractalcontact.contact._load_path import ScaledPath, Step, press_punch, solve_path
-from fractalcontact.contact._options import FORCE_ROUNDING
+from fractalcontact.contact._problem import FORCE_ROUNDING
 from fractalcontact.contact._tangential_operator import TangentialOperator
 
 METHODS = ("superposition", "full")

@@ -19,8 +19,8 @@ from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import in_bands
 from fractalcontact.contact._operator import convolution_symbol, padded_length
-from fractalcontact.contact._preconditioner import DECAY, FADE, bin_layout
-from fractalcontact.contact._scaled_problem import Body
+from fractalcontact.contact._preconditioner import FADE, bin_layout, bin_tables
+from fractalcontact.contact._problem import Body
 
 
 class TangentialOperator:
@@ -203,11 +203,7 @@ class TangentialPreconditioner:
         self.edges, self.plane_shape, self.bins = bin_layout(body)
         self.multiplier = WaveVectorMultiplier(self.plane_shape, body.spacing, operator.poisson, inverse=True)
         spacing = (body.spacing[0] * self.edges[0], body.spacing[1] * self.edges[1])
-        k = np.hypot(
-            fft.wavenumbers(self.bins[0], spacing[0])[:, None],
-            fft.wavenumbers(self.bins[1], spacing[1], real=True)[None, :],
-        )
-        self.poisson_kernel = np.exp(-DECAY * np.sqrt(spacing[0] * spacing[1]) * k)
+        self.poisson_kernel = bin_tables(self.bins, spacing, "d")[0]
         row, column = np.divmod(operator.nodes, body.shape[1])
         self.nodes = row * self.plane_shape[1] + column
         self.bin_of_node = row // self.edges[0] * self.bins[1] + column // self.edges[1]

@@ -16,7 +16,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import detrended, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.contact._options import ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._problem import ContactOptions, LoadPath, check_scale
 
 THEORIES = ("persson", "greenwood_williamson", "bush_gibson_thomas", "hertz")
 # contact fraction beyond which asperities no longer deform independently: a choice, for greenwood_williamson

@@ -28,7 +28,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
 from fractalcontact.contact._operator import HalfSpaceOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
-from fractalcontact.contact._scaled_problem import Body, Control, Problem, Solution
+from fractalcontact.contact._problem import Body, Control, Problem, Solution
 
 Window = tuple[slice, slice]
 
@@ -60,7 +60,8 @@ class WindowSolver:
         self._pair_tables: tuple[Array, Array] | None = None
         self._sorted_gap: Array | None = None
         self._window: tuple[Window, Problem] | None = None
-        self._systems: dict[Any, ContactSystem] = {}  # of the window, by precision; free bodies only
+        # of the last window, by precision; free bodies only, whose coefficients take time
+        self._systems: dict[Any, ContactSystem] = {}
 
     def solve(self, control: Control, guess: Array | None = None) -> Solution:
         """Solve one step of the path, from a pressure or from those of the steps before."""
@@ -81,7 +82,6 @@ class WindowSolver:
         """Go on with another gap, where yielded nodes have been lowered."""
         self.problem = replace(self.problem, gap=gap)
         self._sorted_gap, self._window = None, None
-        self._systems = {}
 
     def solve_from_the_closure(self, control: Control, rough: Solution) -> Solution:
         """Go on with gaps that count from the closure; return the better solution.
@@ -354,11 +354,12 @@ class WindowSolver:
             gap = self.problem.gap[window]
             body = replace(self.problem.body, shape=(gap.shape[0], gap.shape[1]))
             self._window = (window, Problem(body, gap, self.problem.p_max))
-            self._systems = {}
+            kept = {dtype: system for dtype, system in self._systems.items() if system.h.shape == gap.shape}
+            self._systems = {dtype: replace(system, h=gap) for dtype, system in kept.items()}
         return self._window[1]
 
     def system(self, part: Problem, dtype: Any) -> ContactSystem:
-        """Return the system of a window in one precision; kept for a free body, as that takes time."""
+        """Return the system of a window in one precision."""
         if dtype in self._systems:
             return self._systems[dtype]
         operator = None

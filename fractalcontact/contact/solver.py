@@ -29,7 +29,7 @@ from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._flat_block import block_stiffness
 from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path
-from fractalcontact.contact._options import CONTROLS, FORCE_ROUNDING, ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._problem import CONTROLS, FORCE_ROUNDING, ContactOptions, LoadPath, check_scale
 from fractalcontact.contact._superposition import (
     ACCEPTABLE_ERROR,
     METHODS,
@@ -324,11 +324,12 @@ def _solve_fully(
     superposition: Superposition, columns: dict[str, Array], keep: Sequence[str]
 ) -> dict[str, Array]:
     """Return the maps of the full method and write its columns; every step starts from the superposition."""
-    from fractalcontact.contact._coulomb import coulomb_path, empty_maps
+    from fractalcontact.contact._coulomb import coulomb_path
     from fractalcontact.contact._tangential_operator import TangentialOperator
 
     shear, normal, contact = superposition.shear, superposition.normal, superposition.contact
-    maps = empty_maps(keep, (len(shear.forces), *contact.shape))
+    shape = (len(shear.forces), *contact.shape)
+    maps = {name: np.zeros(shape, np.int8 if name == "slip_state" else np.float64) for name in keep}
     if contact.any():
         operator = TangentialOperator(normal.path.body, contact, shear.poisson)
         law = (shear.friction, np.array(shear.unit))

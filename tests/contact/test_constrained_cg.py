@@ -8,7 +8,7 @@ from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.contact import _window_solver
 from fractalcontact.contact._kernels import projected_step_sums
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet
-from fractalcontact.contact._scaled_problem import Body
+from fractalcontact.contact._problem import Body
 
 MODULUS = 1e9
 

@@ -21,7 +21,7 @@ import fractalcontact as fc
 from fractalcontact.base import resources
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.contact import _tangential_operator
-from fractalcontact.contact._scaled_problem import Body
+from fractalcontact.contact._problem import Body
 
 
 def corner_operator(spacing, contact, poisson):
