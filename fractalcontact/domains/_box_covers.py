@@ -252,8 +252,14 @@ def _coarsen(cells: Array, factor: int) -> Array:
         coarse = np.empty((-(-ny // 2), nx // 2), np.uint8)
         halve(cells.view(np.uint16), coarse)
         return coarse
-    rows = np.bitwise_or.reduceat(cells, np.arange(0, ny, factor), axis=0)
-    return np.bitwise_or.reduceat(rows, np.arange(0, nx, factor), axis=1)
+    for axis in (0, 1):
+        lines = np.moveaxis(cells, axis, 0)
+        coarse = np.copy(lines[::factor])  # a reduction by `reduceat` takes 13 to 25 times as long
+        for following in range(1, factor):
+            part = lines[following::factor]
+            coarse[: len(part)] |= part
+        cells = np.moveaxis(coarse, 0, axis)
+    return cells
 
 
 @kernel

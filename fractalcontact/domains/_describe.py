@@ -20,7 +20,6 @@ from fractalcontact.domains import (
     _islands,
     _lacunarity,
     _minkowski,
-    _percolation,
     _signature,
 )
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
@@ -33,8 +32,9 @@ ANALYSES: dict[str, Any] = {  # modules with a function `analyse` of planes
     "boundary_dimension": _boundary,
     "lacunarity": _lacunarity,
 }
-_MODULES = {"islands": _islands, "percolation": _percolation, **ANALYSES}
-MEASURES = tuple(_MODULES)
+SOURCES = {"islands": _islands.SOURCE, "percolation": _islands.CROSSING_SOURCE}
+SOURCES |= {name: module.SOURCE for name, module in ANALYSES.items()}
+MEASURES = tuple(SOURCES)
 DESCRIBED = ("islands", "percolation", *(name for name in ANALYSES if name != "lacunarity"))  # a curve alone
 DESCRIBED_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension")
 NOT_COLLECTED = ("scale_min", "scale_max", "run_time", "integral_range")
@@ -47,7 +47,7 @@ Variable = tuple[tuple[str, ...], Array]
 
 def sources(measures: Sequence[str]) -> str:
     """Return the sources of several measures."""
-    return joined_references(*(_MODULES[name].SOURCE for name in measures))
+    return joined_references(*(SOURCES[name] for name in measures))
 
 
 def _check(problems: Problems) -> None:
@@ -150,11 +150,7 @@ def measure_planes(
             values = {"total_perimeter": perimeter, **values}
         result.variables.update({name: planes.variable(array) for name, array in values.items()})
     if "percolation" in wanted:
-        values = _percolation.crossings(components, planes)
-        result.variables["largest_share"] = planes.variable(values["largest_share"])
-        result.variables["percolates"] = planes.variable(values["percolates"], "axis")
-        result.coords["axis"] = ("axis", np.array(_percolation.AXES))
-        result.notes["percolates"] = {"long_name": _percolation.percolation_name(connectivity)}
+        result.add_dataset(_islands.crossings(components, planes, connectivity))
     datasets = {name: module.analyse(planes) for name, module in ANALYSES.items() if name in wanted}
     box_sizes = [dataset["box_size"].values for dataset in datasets.values() if "box_size" in dataset.coords]
     all_sizes = np.unique(np.concatenate([np.empty(0, np.int64), *box_sizes]))

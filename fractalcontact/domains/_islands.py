@@ -1,4 +1,4 @@
-"""Islands of contact: their number, their sizes and perimeters, where they lie."""
+"""Islands of contact: their number, their sizes and perimeters, where they lie, and whether one crosses."""
 
 from __future__ import annotations
 
@@ -179,3 +179,72 @@ def _notes(planes: Planes, *, too_many: bool) -> dict[str, dict[str, str]]:
     if too_many:
         notes["n_islands"] = {"comment": "too many for the full table: name the columns to have them all"}
     return notes
+
+
+CROSSING_SOURCE = "Stauffer and Aharony, Introduction to Percolation Theory (1994)"
+
+
+@public_result(
+    title="Percolation of a set", references=CROSSING_SOURCE, achieved_error="exact", check=check_connected
+)
+def percolation(
+    mask: xr.DataArray,
+    *,
+    connectivity: int = 1,
+    periodic: bool | None = None,
+    valid: xr.DataArray | None = None,
+) -> xr.Dataset:
+    """Whether an island of the set crosses the plane along x, and along y.
+
+    It crosses along a free axis if it touches both ends, and along a periodic one if it closes on itself
+    around the period. It may close after periods of the other axis too: a diagonal band crosses along both.
+
+    Parameters
+    ----------
+    mask : DataArray, dims (..., y, x)
+        Boolean, or integer flags where contact means value > 0.
+    connectivity : {1, 2}
+        1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours). A
+        set that crosses with 4 neighbours separates its complement with 8, across the crossing.
+    periodic : bool, optional
+        Whether islands continue across the edges; by default along periodic axes. True needs periodic axes.
+    valid : DataArray of bool, dims (y, x) or those of the mask, optional
+        Observed cells; the others are not in the set.
+
+    Returns
+    -------
+    Dataset
+        Over the leading dims of the mask: `coverage`; `largest_share`, the share of the set in its largest
+        island (NaN for an empty plane); and over `axis` ("x", "y") too `percolates`.
+
+    Raises
+    ------
+    InvalidInput
+        The mask, `connectivity`, `periodic` or `valid` is not as described.
+
+    Examples
+    --------
+    >>> import numpy as np, xarray as xr, fractalcontact as fc
+    >>> rows = np.zeros((6, 6), bool)
+    >>> rows[[1, 4]] = True
+    >>> fc.domains.percolation(xr.DataArray(rows, dims=("y", "x"))).percolates.values.tolist()
+    [True, False]
+    """
+    planes = read_planes(mask, valid=valid, periodic=periodic)
+    return crossings(label_planes(planes, connectivity, keep=False), planes, connectivity)
+
+
+def crossings(components: Sequence[Components], planes: Planes, connectivity: int) -> xr.Dataset:
+    """Return the result of `percolation` for planes and their islands, without labels."""
+    largest = np.array([plane.sizes.max(initial=0) for plane in components])
+    share = np.where(planes.occupied > 0, largest / np.maximum(planes.occupied, 1), np.nan)
+    periodic = planes.grid.periodic
+    crosses = [[plane.percolates(axis, periodic[axis]) for axis in (1, 0)] for plane in components]
+    variables = {
+        "coverage": planes.variable(planes.coverage),
+        "largest_share": planes.variable(share),
+        "percolates": planes.variable(np.array(crosses), "axis"),
+    }
+    name = f"an island of the set crosses the plane along the axis ({4 * connectivity} neighbours)"
+    coords = {"axis": ("axis", np.array(("x", "y")))}
+    return planes.dataset(variables, coords, notes={"percolates": {"long_name": name}})

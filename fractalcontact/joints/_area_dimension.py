@@ -22,7 +22,6 @@ from fractalcontact.joints._sheared_contact import (
     PRESSING_BYTES,
     Pressing,
     check_pressing,
-    over_directions,
     press_sheared,
     pressed_dataset,
 )
@@ -129,8 +128,8 @@ def area_dimension(
     pressed = []
     for factor in np.sort(used):
         coarser = replace(pressing, factor=int(factor))
-        columns = over_directions(coarser, [press_sheared(coarser, shears, towards, False)])
-        pressed.append(pressed_dataset(coarser, shears, [towards], columns).isel(direction=0))
+        columns = press_sheared(coarser, shears, towards, False)
+        pressed.append(pressed_dataset(coarser, shears, [towards], [columns]).isel(direction=0))
     areas = fc.domains.area_dimension([each["state"] for each in pressed])
     result = areas.drop_vars(("run_time", "closure")).drop_attrs(deep=False)
     for name in ("interface_closure", "residual", "converged"):

@@ -24,7 +24,6 @@ from fractalcontact.joints._sheared_contact import (
     check_pressed,
     check_pressing,
     check_unpressed,
-    over_directions,
     press_against_spring,
     press_sheared,
     pressed_dataset,
@@ -148,8 +147,7 @@ def dilatancy(
             columns = press_against_spring(pressing, shears, lifted, towards, stiffness, progress)
         by_direction.append(columns)
     has_spring = normal_stiffness is not None
-    pressed_columns = over_directions(pressing, by_direction)
-    under_force = pressed_dataset(pressing, shears, directions, pressed_columns, has_spring=has_spring)
+    under_force = pressed_dataset(pressing, shears, directions, by_direction, has_spring=has_spring)
     under_force = under_force.reset_coords("closure").drop_vars(("contact_area", "run_time"))
     result = under_force.merge(rigid, compat="override", combine_attrs="override")
     result["dilatancy"] = result["rigid_dilatancy"] - result["interface_closure"]

@@ -361,17 +361,17 @@ def pressed_dataset(
     pressing: Pressing,
     shears: Array,
     directions: Sequence[Direction],
-    stacked: Columns,
+    pressed: Sequence[Columns],
     *,
     has_spring: bool = False,
 ) -> xr.Dataset:
-    """Return columns over (direction, shear, step), and maps over (..., y, x).
+    """Return the columns of every direction over (direction, shear, step), and maps over (..., y, x).
 
     Without a spring the prescribed load is the same at every shear, and a coordinate of `step` alone.
     """
     from fractalcontact.contact import solver
 
-    crack, load = pressing.crack, pressing.load
+    crack, load, stacked = pressing.crack, pressing.load, over_directions(pressing, pressed)
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in stacked.items()}
     solvers = variables.pop("solver")[1]

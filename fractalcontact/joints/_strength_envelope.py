@@ -1,7 +1,8 @@
-"""Shear strength of a joint against the normal stress, by empirical criteria side by side."""
+"""Shear strength of a joint by empirical criteria, and its shear stress against displacement after Barton."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,20 +10,12 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import read_direction
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
-from fractalcontact.joints._criteria import (
-    POSITIVE,
-    STRENGTH,
-    STRENGTH_REFERENCES,
-    Joint,
-    check_measured,
-    check_quantities,
-    longer_joint,
-)
-from fractalcontact.joints._directional_roughness import directional_roughness
-from fractalcontact.joints._roughness_coefficient import roughness_coefficient as measured_coefficient
+from fractalcontact.joints import _criteria
+from fractalcontact.joints._roughness import directional_roughness
+from fractalcontact.joints._roughness import roughness_coefficient as measured_coefficient
 
 WHERE = "fractalcontact.joints.strength_envelope"
 
@@ -33,33 +26,35 @@ OUTSIDE = "outside the range of the criterion where in_range is False"
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    problems.numbers("nominal_pressure", **POSITIVE)
-    check_quantities(problems, "wall_strength", "basic_friction_angle")
+    problems.numbers("nominal_pressure", **_criteria.POSITIVE)
+    _criteria.check_quantities(problems, "wall_strength", "basic_friction_angle")
     if given.criterion is None:
         expected = "heights, or an asperity_angle or roughness_coefficient in their place"
         problems.require(bool(_usable(vars(given))), "surface", expected)
-    elif problems.choices("criterion", among=STRENGTH):
+    elif problems.choices("criterion", among=_criteria.STRENGTH):
         names = word_tuple(given.criterion)
         problems.require(len(names) > 0, "criterion", "at least one", "an empty sequence")
         for name in names:
             for need in _missing(name, vars(given)):
                 problems.add(need, f"a value, for criterion {name!r}")
-    check_measured(problems, measured_coefficient, directional_roughness)
+    _criteria.check_measured(problems, measured_coefficient, directional_roughness)
 
 
 def _missing(criterion: str, given: Mapping[str, Any]) -> list[str]:
     """Return the arguments that a criterion needs and that are not given."""
     measured = () if given["surface"] is None else MEASURED
-    return [need for need in STRENGTH[criterion].needs if given[need] is None and need not in measured]
+    return [
+        need for need in _criteria.STRENGTH[criterion].needs if given[need] is None and need not in measured
+    ]
 
 
 def _usable(given: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(name for name in STRENGTH if not _missing(name, given))
+    return tuple(name for name in _criteria.STRENGTH if not _missing(name, given))
 
 
 @public_result(
     title="strength envelope",
-    references=STRENGTH_REFERENCES,
+    references=_criteria.STRENGTH_REFERENCES,
     achieved_error="that of the criteria, which are empirical",
     reasons=dict.fromkeys(("shear_strength", "friction_angle"), NO_STRENGTH),
     check=_check,
@@ -165,24 +160,26 @@ def strength_envelope(
     }
     chosen = _usable(given) if criterion is None else word_tuple(criterion)
     measured = _measured(surface, direction)
-    joint = Joint.of(given, measured)
+    joint = _criteria.Joint.of(given, measured)
     with Problems(WHERE) as problems:
         total = joint.asperity_angle + joint.basic_friction_angle
         expected = "less than 90 degrees with the basic friction angle"
         problems.require(not total >= 90.0, "asperity_angle", expected, f"{total:g}")
-    strengths, ranges = zip(*(STRENGTH[name].strength(pressure, joint) for name in chosen), strict=True)
+    strengths, ranges = zip(
+        *(_criteria.STRENGTH[name].strength(pressure, joint) for name in chosen), strict=True
+    )
     measured_notes = measured["roughness_coefficient"].attrs if measured else {}
     dims = ("criterion", "nominal_pressure")
     variables: dict[str, Any] = {
         "shear_strength": (dims, np.array(strengths)),
         "friction_angle": (dims, np.degrees(np.arctan(np.array(strengths) / pressure))),
         "in_range": (dims, np.array(ranges)),
-        "assumption": ("criterion", np.array([STRENGTH[name].assumption for name in chosen])),
+        "assumption": ("criterion", np.array([_criteria.STRENGTH[name].assumption for name in chosen])),
         "roughness_coefficient": ((), joint.roughness_coefficient, measured_notes),
         "asperity_angle": joint.asperity_angle,
     }
     if length is not None:
-        longer = longer_joint(joint.roughness_coefficient, joint.wall_strength, joint.length)
+        longer = _criteria.longer_joint(joint.roughness_coefficient, joint.wall_strength, joint.length)
         names = ("scaled_roughness_coefficient", "scaled_wall_strength", "peak_displacement")
         variables |= dict(zip(names, longer, strict=True))
     coords: dict[str, Any] = {"criterion": np.array(chosen), "nominal_pressure": pressure}
@@ -218,3 +215,134 @@ def _explain(result: xr.Dataset, has_surface: bool) -> None:
     for name in ("roughness_coefficient", "asperity_angle"):
         if np.isnan(result[name]):
             result[name].attrs["reason"] = unknown
+
+
+SMOOTH = "the surface has no roughness on the scale of standard profiles: JRC is below 0"
+
+
+def _check_curve(problems: Problems) -> None:
+    given = problems.given
+    if problems.numbers("displacement", at_least=0, at_most=_criteria.POSITIVE["at_most"]):
+        ascending = bool((np.diff(float_array(given.displacement)) > 0).all())
+        problems.require(ascending, "displacement", "ascending values")
+    problems.numbers("nominal_pressure", **_criteria.POSITIVE)
+    required = ("wall_strength", "residual_friction_angle", "length")
+    _criteria.check_quantities(
+        problems, *required, residual_friction_angle={"below": _criteria.LARGEST_ANGLE}
+    )
+    problems.number("damage_coefficient", at_least=1, at_most=2, optional=True)
+    problems.number("normal_stiffness", **_criteria.POSITIVE, optional=True)
+    _criteria.check_measured(problems, measured_coefficient)
+    if given.surface is None:
+        expected = "heights, or a roughness_coefficient in their place"
+        problems.require(given.roughness_coefficient is not None, "surface", expected, None)
+
+
+@public_result(
+    title="Barton-Bandis shear curve",
+    references=(
+        "Barton (1982), Terra Tek report 82-39; Barton, Bandis and Bakhtar (1985), Int. J. Rock Mech. Min. "
+        "Sci. 22:121; Barton and Choubey (1977), Rock Mechanics 10:1"
+    ),
+    achieved_error="that of the criterion, which is empirical",
+    check=_check_curve,
+)
+def shear_curve(
+    surface: xr.DataArray | None,
+    displacement: float | Sequence[float] | Array,
+    *,
+    nominal_pressure: float | Sequence[float],
+    wall_strength: float,
+    residual_friction_angle: float,
+    direction: str | float = "E",
+    roughness_coefficient: float | None = None,
+    length: float = _criteria.SAMPLE_LENGTH,
+    damage_coefficient: float | None = None,
+    normal_stiffness: float | None = None,
+) -> xr.Dataset:
+    """Return shear stress and dilation against shear displacement by the mobilised roughness of Barton.
+
+    tau = sigma tan(phi_r + JRC_mob log10(JCS/sigma)), where JRC_mob rises to JRC at the displacement of the
+    peak and falls beyond it. The empirical counterpart of `direct_shear`.
+
+    Parameters
+    ----------
+    surface : DataArray, shape (y, x), optional
+        Heights of one face, m, of which the JRC is taken. None: a joint that is known by its JRC only.
+    displacement : float or sequence of float
+        Shear displacements, m, ascending, from 0 on.
+    nominal_pressure : float or sequence of float
+        Normal stresses at the start, Pa.
+    wall_strength : float
+        Compressive strength JCS of the walls, Pa.
+    residual_friction_angle : float
+        phi_r, degree.
+    direction : str or float
+        Direction in which the block slides: compass word, or degrees anticlockwise from E.
+    roughness_coefficient : float, optional
+        JRC of 0.1 m, 0 to 20. Default: that of the surface.
+    length : float
+        Length of the joint, m, at least 0.1, for which JRC, JCS and the peak displacement hold.
+    damage_coefficient : float, optional
+        M, by which the dilation is less than the angle of the roughness: 1 at low normal stress to 2 at high.
+        Default: 0.7 + JRC/(12 log10(JCS/sigma)), within 1 and 2.
+    normal_stiffness : float, optional
+        Stiffness of a spring on the block per area, Pa/m. Default: constant normal stress.
+
+    Returns
+    -------
+    Dataset over (shear_displacement, nominal_pressure)
+        shear_stress, normal_stress, Pa; friction_angle, dilatancy_angle, degree; dilatancy, m. Over
+        nominal_pressure: peak_shear_strength, Pa, and in_range, whether the criterion was made for such
+        values. Also peak_displacement, m, and the roughness_coefficient of the length.
+
+    Raises
+    ------
+    InvalidInput
+        An argument is wrong.
+
+    Notes
+    -----
+    Mobilised over peak JRC is 0, 0.75, 1, 0.85, 0.7, 0.5, 0 at 0.3, 0.6, 1, 2, 4, 10, 100 times the peak
+    displacement L/500 (JRC/L)^0.33; before 0.3 friction alone is mobilised, from 0. The friction angle is
+    limited to 70 degrees.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((128, 128), 0.5e-3, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> curve = fc.joints.shear_curve(
+    ...     surface, [0, 1e-3, 1e-2], nominal_pressure=1e6, wall_strength=1e8, residual_friction_angle=28
+    ... )
+    >>> curve.friction_angle.values[:, 0].round(1).tolist()
+    [0.0, 42.8, 35.5]
+    """
+    jrc_of_sample = math.nan if roughness_coefficient is None else float(roughness_coefficient)
+    if surface is not None and roughness_coefficient is None:
+        measured = measured_coefficient(surface, direction=direction)
+        jrc_of_sample = measured["roughness_coefficient"].item()
+    jrc, jcs, peak = _criteria.longer_joint(jrc_of_sample, float(wall_strength), float(length))
+    peak = max(peak, 1e-4 * float(length))  # as of JRC = 1e-5: a plane has no displacement of its own
+    given, pressures = float_array(displacement), float_array(nominal_pressure)
+    residual = float(residual_friction_angle)
+    stiffness = 0.0 if normal_stiffness is None else float(normal_stiffness)
+    columns = _criteria.barton_shear(
+        given, pressures, (jrc, jcs, peak), residual, damage_coefficient, stiffness
+    )
+    inside = _criteria.in_tested_range(pressures, jcs, jrc_of_sample)
+    dims = ("shear_displacement", "nominal_pressure")
+    variables: dict[str, Any] = {name: (dims, values) for name, values in columns.items()}
+    at_peak = np.radians(residual + _criteria.roughness_angle(pressures, jrc, jcs, residual))
+    variables["peak_shear_strength"] = "nominal_pressure", pressures * np.tan(at_peak)
+    variables |= {"in_range": ("nominal_pressure", inside), "peak_displacement": peak}
+    variables["roughness_coefficient"] = jrc
+    coords: dict[str, Any] = {"nominal_pressure": pressures, "shear_displacement": given}
+    if surface is not None:
+        coords["direction"] = read_direction(direction).name
+    result = xr.Dataset(variables, coords)
+    result["peak_shear_strength"].attrs["long_name"] = "shear strength at the peak, under the first stress"
+    if not inside.all():
+        result["shear_stress"].attrs["comment"] = OUTSIDE
+    if not jrc_of_sample >= 0:
+        result["roughness_coefficient"].attrs["comment"] = SMOOTH
+    return result
