@@ -80,23 +80,33 @@ def test_every_call_is_made_once_by_one_of_two_processes(note):
     assert callers[0] == [str(os.getpid())]
 
 
+LATER = """
+import sys, time
+from pathlib import Path
+from fractalcontact.base.process import calls_in_two_processes
+
+begun, done = Path(sys.argv[1]), []
+
+
+def call(number):
+    if number:
+        begun.touch()
+        time.sleep(0.2)
+    while not begun.exists():
+        time.sleep(0.01)
+
+
+for number, _ in calls_in_two_processes(call, 2, lambda: done.append("later")):
+    assert done == ["later"] * number  # call 1 is that of the copy
+assert done == ["later"]
+"""
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="no process is copied")
-def test_what_is_needed_later_is_done_before_the_wait_for_the_copy(note, tmp_path):
-    if not alone():
-        pytest.skip("a thread keeps this process from being copied")
-    begun, done = tmp_path / "begun", []
-
-    def call(number):
-        if number:
-            begun.touch()
-            time.sleep(0.2)
-        while not begun.exists():
-            time.sleep(0.01)
-        return note(number)
-
-    for number, _ in calls_in_two_processes(call, 2, lambda: done.append("later")):
-        assert done == ["later"] * number  # call 1 is that of the copy
-    assert done == ["later"]
+def test_what_is_needed_later_is_done_before_the_wait_for_the_copy(tmp_path):
+    # in a process of its own: a worker of the tests has threads, so that it is not copied
+    command = [sys.executable, "-c", LATER, str(tmp_path / "begun")]
+    subprocess.run(command, check=True, timeout=60, env={**os.environ, "FRACTALCONTACT_THREADS": "2"})
 
 
 @pytest.mark.parametrize("end", [lambda: os._exit(1), lambda: 1 / 0])
