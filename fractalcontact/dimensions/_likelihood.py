@@ -195,7 +195,7 @@ def fitted_modes(surface: Surface, spread: float | None = None, corrections: int
         if is_complete and lattice.stretch == ratio_of_lags == 1.0:
             break
         if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
-            bins = make_bins(lattice, power / level, pilot, keep, information=information)
+            bins = make_bins(lattice, power / level, pilot, keep, information=information, is_pilot=True)
             hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
             form = hypothesis.form
         lattice = replace(lattice, stretch=ratio_of_lags)
@@ -230,7 +230,7 @@ def _first_fit(
     torus = replace(torus, stretch=stretch(torus, levels, pilot, information=TAPERED))
     y, x = torus.wavenumbers
     pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
-    bins = make_bins(torus, power, pilot, keep, is_tapered=not is_periodic)
+    bins = make_bins(torus, power, pilot, keep, is_tapered=not is_periodic, is_pilot=True)
     hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
     return theta, hypothesis.form, torus.stretch
 

@@ -212,6 +212,7 @@ def make_bins(
     *,
     information: Array | float = 1.0,
     is_tapered: bool = False,
+    is_pilot: bool = False,
 ) -> Bins:
     """Average modes in bins, and the Gaussians of the mixture likewise.
 
@@ -226,12 +227,14 @@ def make_bins(
     is_tapered : bool
         Modes of a tapered surface: neighbours are correlated, and bins take the median, which withstands
         marks.
+    is_pilot : bool
+        For a first estimate of the spectrum: with a coarser table.
     """
     from scipy.special import digamma, polygamma
 
     classes = _bin_classes(lattice, keep, is_tapered=is_tapered)
     ratio, count = power / pilot, classes.count
-    sample, step = _SAMPLES[not is_tapered], _SPREAD_STEPS[not is_tapered]
+    sample, step = _SAMPLES[not is_pilot], _SPREAD_STEPS[not is_pilot]
     total, lnq, chosen = _sums(classes, ratio, lattice, sample)
     mean = total / count
     if is_tapered:
