@@ -50,12 +50,12 @@ def resampling(surface: Surface, linear: float = 0.01) -> str:
 
 
 def rounding_step(
-    surface: Surface, *, rows: int = 16, sample: int = 4096, whole: float = 0.02, distinct: float = 0.5
+    surface: Surface, *, rows: int = 16, sample: int = 4096, tolerance: float = 0.02, distinct: float = 0.5
 ) -> float:
     """Return the step to which scaled heights were rounded; 0 where none is seen in a sample of some rows.
 
-    Second differences are multiples of it, also once a plane was subtracted. `whole`: of a step, distance
-    of rounded heights from whole steps after a change of unit. `distinct`: share of distinct second
+    Second differences are multiples of it, also once a plane was subtracted. `tolerance`: of a step, distance
+    of rounded heights from multiples after a change of unit. `distinct`: share of distinct second
     differences beyond which heights are not rounded.
     """
     lines = surface.heights[:: max(1, surface.shape[0] // rows)]
@@ -67,9 +67,9 @@ def rounding_step(
     if observed.size < 8 or not 2 <= levels.size <= distinct * observed.size:
         return 0.0
     gaps = np.diff(levels)
-    step = float(gaps[gaps > whole * np.median(gaps)].min())
+    step = float(gaps[gaps > tolerance * np.median(gaps)].min())
     multiples = (levels - levels[0]) / step
-    return step if np.abs(multiples - np.rint(multiples)).max() <= whole else 0.0
+    return step if np.abs(multiples - np.rint(multiples)).max() <= tolerance else 0.0
 
 
 def unevenness(heights: Array, blocks: int = 8, parts: int = 4) -> float:
@@ -113,14 +113,14 @@ def _squared_bends(heights: Array, rows: int = 32) -> Iterator[Array]:
         yield np.square(bends, out=bends)
 
 
-def _spikes(heights: Array, known: int = 1 << 20, spike: float = 20.0, spiked: float = 0.1) -> str:
+def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0, least_share: float = 0.1) -> str:
     """Look for squared differences beyond those of a Gaussian surface.
 
-    The quantile of some `known` ones scatters by .2 %. `spike`: standard deviations; 1e8 Gaussian second
-    differences reach 5.7, a scanned rock face 15. `spiked`: share of their squares below which noise and
-    misfit describe them.
+    The quantile of a sample of this `size` scatters by .2 %. `spike`: standard deviations; 1e8 Gaussian
+    second differences reach 5.7, a scanned rock face 15. `least_share`: share of their squares below which
+    noise and misfit describe them.
     """
-    step = -(-heights.size // known)
+    step = -(-heights.size // size)
     sample = np.concatenate([squares.ravel()[::step] for squares in _squared_bends(heights)])
     sample = sample[np.isfinite(sample)]
     if sample.size == 0:
@@ -131,12 +131,11 @@ def _spikes(heights: Array, known: int = 1 << 20, spike: float = 20.0, spiked: f
     for squares in _squared_bends(heights):
         high = squares[squares > spike**2 * typical]
         number, above, total = number + high.size, above + high.sum(), total + np.nansum(squares)
-    if typical == 0.0 or above < spiked * total:
+    if typical == 0.0 or above < least_share * total:
         return ""
     return (
-        f"{number} heights stand out of their neighbours by more than {spike:.0f} standard "
-        f"deviations: spikes or "
-        "steps; see fractalcontact.surfaces.despike"
+        f"{number} heights stand out of their neighbours by more than {spike:.0f} standard deviations: "
+        "spikes or steps; see fractalcontact.surfaces.despike"
     )
 
 

@@ -50,6 +50,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     SPREAD,
     Posterior,
     bin_power,
+    mixture_quantile,
     posterior,
 )
 from fractalcontact.dimensions._surface_input import (
@@ -194,7 +195,7 @@ class _Windows:
         return int(self.rows.size * self.columns.size)
 
     @property
-    def new(self) -> float:
+    def new_share(self) -> float:
         """Share of a window that the one before does not have."""
         return math.prod(min(1.0, s / edge) for s, edge in zip(self.steps, self.edges, strict=True))
 
@@ -218,8 +219,9 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
 
     degrees = 0.5 * model.lattice.degrees * model.count * share
     level = np.log(np.maximum(mean, 1e-300)) + np.log(degrees) - digamma(degrees)
-    quantiles = _quantiles(*model.components(level, polygamma(1, degrees), windows.new, scales is not None))
-    for place, (low, hurst, high) in zip(chosen, quantiles, strict=True):
+    mixture = model.components(level, polygamma(1, degrees), windows.new_share, scales is not None)
+    quantiles = (mixture_quantile(share, *mixture) for share in (0.025, 0.5, 0.975))
+    for place, low, hurst, high in zip(chosen, *quantiles, strict=True):
         record = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high)
         wide = f"the heights of a window do not determine its exponent: {low:.2f} to {high:.2f} is as likely"
         records[place] = record.without_interval(wide) if high - low > WIDEST else record
@@ -338,7 +340,7 @@ class _Model:
         self,
         level: Array,
         variance: Array,
-        new: float,
+        new_share: float,
         is_window: bool,
         *,
         probability: float = 0.99,
@@ -346,18 +348,18 @@ class _Model:
     ) -> tuple[Array, Array, Array]:
         """Return shares, and means and deviations of u of each window, for probable nuisances.
 
-        `level` and `variance` are those of the bins of each window, `new` the share of its points that a
+        `level` and `variance` are those of the bins of each window, `new_share` that of its points that a
         window does not have in common with the one before. Those that together have the `probability` are
         used, at most `most` of them.
         """
-        known = 0.0 if is_window else None
-        mean, scatter = _mean_of_windows(level, variance, self.bins.lnq, max(new, 1.0 / len(level)))
+        absent = 0.0 if is_window else None
+        mean, scatter = _mean_of_windows(level, variance, self.bins.lnq, max(new_share, 1.0 / len(level)))
         bins = replace(self.bins, level=mean, variance=scatter)
         spread = 0.0 if is_window else float(self.fit.theta[SPREAD])
         found = posterior(
             bins,
-            spread=known,
-            noise=known,
+            spread=absent,
+            noise=absent,
             background=self.background,
             pilot_spread=spread,
             is_window=is_window,
@@ -401,7 +403,7 @@ def _spectra(
 
 
 def _mean_of_windows(
-    level: Array, variance: Array, lnq: Array, new: float, rounds: int = 4
+    level: Array, variance: Array, lnq: Array, new_share: float, rounds: int = 4
 ) -> tuple[Array, Array]:
     """Return the mean levels of the bins and their variance; a window counts by its scatter about them.
 
@@ -413,7 +415,7 @@ def _mean_of_windows(
         mean = (weight * level).sum(axis=0) / weight.sum(axis=0)
         square = _fitted(level - mean, 1.0 / variance, np.broadcast_to(lnq, level.shape))[3]
         factor = np.maximum(1.0, square / max(lnq.size - 2, 1))[:, None]
-    return mean, 1.0 / (new * (1.0 / (factor * variance)).sum(axis=0))
+    return mean, 1.0 / (new_share * (1.0 / (factor * variance)).sum(axis=0))
 
 
 def _about_mean(
@@ -468,18 +470,3 @@ def _fitted(
     first, second = (bb * a - ab * b) / determinant, (aa * b - ab * a) / determinant
     square = (weight * values * values).sum(axis=1) - first * a - second * b
     return first, second, aa / determinant, square
-
-
-def _quantiles(shares: Array, centre: Array, deviation: Array) -> Array:
-    """Return quantiles of H, .025, .5 and .975, of sums of normal distributions of u: (windows, 3)."""
-    from scipy.special import ndtr
-
-    found = []
-    for share in (0.025, 0.5, 0.975):
-        low, high = np.full(len(centre), -8.0), np.full(len(centre), 8.0)
-        for _ in range(40):
-            middle = 0.5 * (low + high)
-            is_below = ndtr((middle[:, None] - centre) / deviation) @ shares < share
-            low, high = np.where(is_below, middle, low), np.where(is_below, high, middle)
-        found.append(LOWEST + (HIGHEST - LOWEST) * ndtr(low))
-    return np.stack(found, axis=1)

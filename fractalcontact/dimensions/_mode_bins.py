@@ -56,15 +56,15 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
 
 
 def clear_modes(
-    total: Array, clean: Array, unblurred: Array, *, leak: float = 0.5, lost: float = 1e-3
+    total: Array, clean: Array, unblurred: Array, *, leak: float = 0.5, least_transfer: float = 1e-3
 ) -> Array:
     """Return the modes that neither the edges nor a filter dominate; see `expected_power`.
 
-    `leak`: share of the edges from which on neighbouring modes are correlated. `lost`: squared transfer
-    function below which no form of a filter holds.
+    `leak`: share of the edges from which on neighbouring modes are correlated. `least_transfer`:
+    squared transfer function below which no form of a filter holds.
     """
     rows = zip(total, clean, unblurred, strict=True)
-    return np.array([(c >= (1.0 - leak) * t) & (c > lost * u) for t, c, u in rows])
+    return np.array([(c >= (1.0 - leak) * t) & (c > least_transfer * u) for t, c, u in rows])
 
 
 def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array:
@@ -399,8 +399,8 @@ def _classes(lattice: Lattice, keep: Array, width: float, split: float) -> _Clas
 def _sums(classes: _Classes, values: Array, lattice: Lattice, size: int) -> tuple[Array, Array, Array]:
     """Return the sums over each class of the values and of ln q, and an even sample of its modes.
 
-    The sample are flat indices, about `size` in a row for each class, then -1. They form a lattice: each row
-    is moved by the golden section of the step against the row before.
+    The sample has about `size` modes of each class: their flat indices, then -1. They form a lattice: each
+    row is moved by the golden section of the step against the row before.
     """
     count = classes.count
     total, lnq = np.zeros(count.size), np.zeros(count.size)

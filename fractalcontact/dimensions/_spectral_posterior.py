@@ -9,9 +9,8 @@ with the Gaussians j of `_gaussian_mixture`: H is the exponent, s the spread of 
 the rms increment, q_0 the wavenumber beyond which long waves have the exponent H_2, k the sharpness of that
 corner: 1 where two surfaces were added, 1 / (1 + H) of a Matern covariance, large of a sudden plateau. The
 amplitude A has a flat prior in ln A, the others those of the constants below. Noise is absent with the
-probability .5, a blur and a corner with .85; blur and sampling take one of three forms
-(`_gaussian_mixture.FORMS`). The logarithms of
-the bins are normal, and
+probability .5, a blur with .85, a corner with .88; blur and sampling take one of three forms
+(`_gaussian_mixture.FORMS`). The logarithms of the bins are normal, and
 
     y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
 
@@ -22,8 +21,8 @@ prior probability (`_discrepancies`).
 
 For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
 unit normal variables u (the maxima, where the model holds), and Laplace's method gives its evidence and a
-normal distribution of u. The
-posterior of H is the sum of these normal distributions: no sampling, and continuous in the heights.
+normal distribution of u. The posterior of H is the sum of these normal distributions: no sampling, and
+continuous in the heights.
 """
 
 from __future__ import annotations
@@ -134,14 +133,9 @@ class Posterior:
 
     def quantile(self, share: float) -> float:
         """Return a quantile of H."""
-        from scipy.special import ndtr
-
-        low, high = -8.0, 8.0  # of u
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            below = float(np.sum(self.share * ndtr((middle - self.centre) / self.scale)))
-            low, high = (middle, high) if below < share else (low, middle)
-        return LOWEST + (HIGHEST - LOWEST) * float(ndtr(low))
+        return float(
+            mixture_quantile(share, *(each.ravel() for each in (self.share, self.centre, self.scale)))
+        )
 
     def log_density(self, u: Array) -> Array:
         """Return the logarithm of the density of u."""
@@ -169,13 +163,25 @@ class Posterior:
         )
 
 
+def mixture_quantile(share: float, shares: Array, centre: Array, scale: Array) -> Array:
+    """Return a quantile of H whose u has a sum of normal distributions, those along the last axis."""
+    from scipy.special import ndtr
+
+    low, high = np.full(centre.shape[:-1], -8.0), np.full(centre.shape[:-1], 8.0)  # of u
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        below = np.sum(shares * ndtr((middle[..., None] - centre) / scale), axis=-1)
+        low, high = np.where(below < share, middle, low), np.where(below < share, high, middle)
+    return np.asarray(LOWEST + (HIGHEST - LOWEST) * ndtr(low))
+
+
 def joint_quantiles(
     posteriors: Sequence[Posterior], shares: Sequence[float], points: int = 2001, zooms: int = 5
 ) -> list[float]:
     """Return quantiles of the H that independent surfaces have in common, each with nuisances of its own.
 
-    Their product has the prior of u, the unit normal distribution, once. It is found at some `points`, which
-    come `zooms` times nearer to where its logarithm is within 20 of the highest.
+    Their product has the prior of u, the unit normal distribution, once. The grid of `points` is narrowed
+    `zooms` times to where its logarithm is within 20 of the highest.
     """
     from scipy.special import ndtr
 
@@ -290,9 +296,9 @@ def _discrepancies(
     *,
     holds: float = 0.8,
     uncut: float = 0.8,
-    off: float = 0.5,
-    left: float = 2.5,
-    deepest: float = 3.5,
+    at_cut: float = 0.5,
+    least_octaves: float = 2.5,
+    most_octaves: float = 3.5,
     fourth_order: float = 0.1,
 ) -> list[Discrepancy]:
     """Return the kinds of discrepancy with their prior probabilities, which sum to one.
@@ -305,11 +311,11 @@ def _discrepancies(
         Probability that (1) holds without a process; with .8 exact intervals are as narrow as without sums.
     uncut : float
         Probability that there is no cut: of .5 and .8, for both, the narrower interval of a blur of 1.
-    off : float
-        Logarithm of the power that is off at a cut.
-    left : float
+    at_cut : float
+        Standard deviation of the logarithm of the power at a cut.
+    least_octaves : float
         Octaves between cuts, to tell an exponent from a corner.
-    deepest : float
+    most_octaves : float
         Octaves beyond a cut: filters of up to ten points, a levelled tenth of the extent.
     fourth_order : float
         Of (s q)^4: the fourth cumulant of a mean over a box has .125.
@@ -321,22 +327,22 @@ def _discrepancies(
     # between rings of bins; those of one ring differ by less than a tenth of an octave
     ends = np.sort(octaves)
     ends = ends[np.flatnonzero(np.diff(ends) > 0.1)]
-    short_cuts = ends[ends > max(lowest + left, highest - deepest)]
-    cuts += [(off * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
-    for cut in ends[ends < min(highest - left, lowest + deepest)][::2]:
-        cuts.append((off * 4.0 ** (cut - octaves), octaves > cut))
+    short_cuts = ends[ends > max(lowest + least_octaves, highest - most_octaves)]
+    cuts += [(at_cut * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
+    for cut in ends[ends < min(highest - least_octaves, lowest + most_octaves)][::2]:
+        cuts.append((at_cut * 4.0 ** (cut - octaves), octaves > cut))
     cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
     fourth = fourth_order * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
-    whole = uncut if cuts else 1.0
+    no_cut = uncut if cuts else 1.0
     has_fourth = bool(fourth.max() > 0.01)
     none = holds * (0.5 if has_fourth else 1.0)
-    kinds = [Discrepancy(np.zeros(octaves.size), everything, whole * none)]
+    kinds = [Discrepancy(np.zeros(octaves.size), everything, no_cut * none)]
     kinds += [
-        Discrepancy(np.full(octaves.size, tau), everything, whole * (1.0 - holds) / len(_TAUS))
+        Discrepancy(np.full(octaves.size, tau), everything, no_cut * (1.0 - holds) / len(_TAUS))
         for tau in _TAUS
     ]
     if has_fourth:
-        kinds.append(Discrepancy(fourth, everything, whole * none))
+        kinds.append(Discrepancy(fourth, everything, no_cut * none))
     return kinds + [Discrepancy(scatter, inside, (1.0 - uncut) / len(cuts)) for scatter, inside in cuts]
 
 

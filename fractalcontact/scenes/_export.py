@@ -19,6 +19,9 @@ from fractalcontact.base.files import written_whole
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import Problems, Words, writing
 
+Array = np.ndarray[Any, np.dtype[Any]]
+
+WHERE = "fractalcontact.scenes.export"
 MAP_DIMS = frozenset({"x", "y"})
 SINGLE = "values"
 
@@ -116,11 +119,6 @@ def heading(dataset: xr.Dataset, name: str) -> str:
     quantity = QUANTITIES.get(name)
     units = attributes.get("units", quantity.units if quantity else "") or ""
     return f"{name} ({units})" if units not in ("", "1") else name
-
-
-Array = np.ndarray[Any, np.dtype[Any]]
-
-WHERE = "fractalcontact.scenes.export"
 
 
 def export(
