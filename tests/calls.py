@@ -287,6 +287,7 @@ CALLS = {
     "scenes.plan": lambda: {"scene": fc.scenes.load("rigid_sliding")},
     "scenes.validate": lambda: {"scene": "rigid_sliding"},
     "scenes.summary": lambda: {"tree": study()},
+    "scenes.datasheet": lambda: {"tree": xr.DataTree.from_dict({"/joints/closure_laws": laws()})},
     "scenes.reproduce": lambda: {"result": rough()},
     "scenes.report": lambda: {"result": study(), "path": PLACE / "report.html"},
     "scenes.tables": lambda: {"result": study()},
@@ -323,6 +324,7 @@ CALLS = {
     "plotting.area_dimension": lambda: {"result": result_of("joints.area_dimension")},
     "plotting.datasheet": lambda: {
         "tree": xr.DataTree.from_dict({"/joints/closure_laws": laws()}), "notes": ["a note"],
+        "numbers": ["a number"],
     },
     "plotting.error_against_time": lambda: {"measured": measured()},
     "plotting.estimator_errors": lambda: {"bench": estimators()},

@@ -71,6 +71,9 @@ class Scale:
         return f"{number(shown, digits)} {self.unit}".rstrip() if np.isfinite(shown) else "-"
 
 
+PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
+
+
 def scale_for(units: str, values: Any) -> Scale:
     """Return the scale for values in `units`; prefixes only for the units in `PREFIXED`."""
     if units in ("", "1"):

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.study import group_of, provenance_of
-from fractalcontact.base.units import Scale, jrc_text, quantity_text, scale_for
+from fractalcontact.base.units import PER_LENGTH, Scale, quantity_text
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure as checked
@@ -19,7 +19,7 @@ from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, by_shear
 from fractalcontact.plotting._strength import shear_curve, strength_envelope
 from fractalcontact.plotting._style import Axes, AxesArray, Figure
-from fractalcontact.plotting._units import PER_LENGTH, Quantity
+from fractalcontact.plotting._units import Quantity
 
 A4 = (8.27, 11.69)  # inches
 FLOW = Scale(1.0, "m³")  # transmissivities span decades: no prefix suits them all
@@ -33,17 +33,23 @@ INPUTS = {
     "wall_strength": ("JCS", "Pa"),
     "hardness": ("hardness", "Pa"),
 }
-ROUGHNESS = ("roughness_coefficient", "directional_roughness")
 GROUPS = (
     "strength_envelope", "direct_shear", "shear_curve", "closure", "closure_laws", "transmissivity",
+    "roughness_coefficient", "directional_roughness", "uplift",
 )  # fmt: skip
 
 
 @checked
 def datasheet(
-    tree: xr.DataTree, *, notes: Sequence[str] = (), figure: Figure | None = None
+    tree: xr.DataTree,
+    *,
+    numbers: Sequence[str] = (),
+    notes: Sequence[str] = (),
+    figure: Figure | None = None,
 ) -> dict[str, Axes]:
-    """Draw one page about a joint: roughness, strength, stiffness, aperture and flow against normal stress.
+    """Draw one page about a joint: strength, stiffness, aperture and flow against normal stress.
+
+    `fractalcontact.scenes.datasheet` draws it with the numbers and the limits of a study.
 
     Parameters
     ----------
@@ -51,6 +57,8 @@ def datasheet(
         From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups
         joints/roughness_coefficient, directional_roughness, strength_envelope, direct_shear, shear_curve,
         closure, closure_laws, transmissivity and uplift. Panels without data stay empty.
+    numbers : sequence of str
+        Lines to print beside the strength.
     notes : sequence of str
         Sentences to print with the limits of validity that the results state themselves.
     figure : Figure, optional
@@ -80,7 +88,7 @@ def datasheet(
     >>> [round(float(inches), 2) for inches in panels["strength"].figure.figure.get_size_inches()]
     [8.27, 11.69]
     """
-    groups = {name: group_of(tree, f"joints/{name}") for name in (*GROUPS, *ROUGHNESS, "uplift")}
+    groups = {name: group_of(tree, f"joints/{name}") for name in GROUPS}
     with Problems("fc.plotting") as problems:
         expected = f"at least one of joints/{', joints/'.join(groups)}"
         problems.require(any(data is not None for data in groups.values()), "tree", expected, NONE)
@@ -91,11 +99,15 @@ def datasheet(
         page.set_size_inches(A4)
         page.set_layout_engine("constrained", w_pad=0.07, h_pad=0.07)
         page.set_facecolor("white")
-        return _draw_page(page, tree, groups, notes)
+        return _draw_page(page, tree, groups, numbers, notes)
 
 
 def _draw_page(
-    page: Figure, tree: xr.DataTree, groups: dict[str, xr.Dataset | None], notes: Sequence[str]
+    page: Figure,
+    tree: xr.DataTree,
+    groups: dict[str, xr.Dataset | None],
+    numbers: Sequence[str],
+    notes: Sequence[str],
 ) -> dict[str, Axes]:
     """Draw the rows of the page; return its panels."""
     panels: dict[str, Axes] = {}
@@ -108,9 +120,9 @@ def _draw_page(
     parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
     facts = "\n".join([_source(tree), *_input_lines(groups)])
     parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
-    left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.75))
-    numbers = [*_roughness_lines(groups), *_closure_lines(groups["closure_laws"])]
-    left.text(0.08, 0.96, "\n".join(numbers), size=7.5, va="top", linespacing=1.4)
+    left, right = parts[1].subfigures(1, 2, width_ratios=(1.3, 1.6))
+    size = min(6.4, 160 / max(len(numbers), 1))  # points: the row has room for 25 lines of 6.4
+    left.text(0.08, 0.96, "\n".join(numbers), size=size, family="monospace", va="top", linespacing=1.4)
     if groups["strength_envelope"] is not None:
         panels["strength"] = right.add_subplot()
         _style.style_axes(panels["strength"])
@@ -124,9 +136,11 @@ def _draw_page(
         _flow_panels(parts[3], groups["closure"], groups["closure_laws"], groups["transmissivity"]),
         strict=True,
     )
-    lines = list(_limits(groups, notes))[:17]  # what fits into the row
+    lines = list(_limits(groups, notes))[:17]  # the row has room for 15 of 6.5 points
     parts[4].text(0.03, 0.95, "Limits of validity", size=9, weight="bold", va="top")
-    parts[4].text(0.03, 0.86, "\n".join(lines), size=6.5, va="top", linespacing=1.35)
+    parts[4].text(
+        0.03, 0.86, "\n".join(lines), size=min(6.5, 94 / max(len(lines), 1)), va="top", linespacing=1.35
+    )
     return panels
 
 
@@ -167,103 +181,6 @@ def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
         texts.append(f"shear towards {stated['direction']}")
     if texts:
         yield "assumed: " + "; ".join(texts)
-
-
-def _roughness_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
-    """Yield the lines of the roughness and of the strength in numbers."""
-    coefficient, facets, tests = (groups[name] for name in (*ROUGHNESS, "direct_shear"))
-    if coefficient is not None:
-        yield "Roughness"
-        for direction in words(coefficient["direction"]):
-            row = coefficient.sel(direction=direction)
-            low, high = float(row["roughness_coefficient_low"]), float(row["roughness_coefficient_high"])
-            spread = f"  (profiles {jrc_text(low)} to {jrc_text(high)})" if np.isfinite(low + high) else ""
-            yield f"  JRC {direction}: {jrc_text(float(row['roughness_coefficient']))}{spread}"
-        lags, intervals = (np.unique(coefficient[name]) for name in ("lag", "regression_interval"))
-        read, fitted = ([quantity_text(float(v), "m") for v in values] for values in (lags, intervals))
-        yield f"      read every {', '.join(read)}; regression {', '.join(fitted)}"
-    if facets is not None:
-        metric = facets["roughness_metric"]
-        places = (int(np.argmin(metric.values)), int(np.argmax(metric.values)))
-        extremes = [facets.isel(azimuth=place) for place in places]
-        values = [f"{float(one['roughness_metric']):.1f}° at {float(one['azimuth']):g}°" for one in extremes]
-        yield f"  θmax/(C+1): {values[0]}"
-        yield f"      to {values[1]}"
-    envelope = groups["strength_envelope"]
-    if envelope is not None:
-        yield f"  asperity angle: {float(envelope['asperity_angle']):.1f}°"
-    if tests is not None:
-        yield ""
-        yield "Direct shear: peak (its angle), residual"
-        for i in range(tests.sizes["nominal_pressure"]):
-            row = tests.isel(nominal_pressure=i)
-            texts = [quantity_text(float(row[name]), "Pa") for name in
-                     ("nominal_pressure", "peak_shear_strength", "residual_shear_strength")]  # fmt: skip
-            angle = float(row["peak_friction_angle"])
-            yield f"  under {texts[0]}: {texts[1]} ({angle:.0f}°), {texts[2]}"
-    water = groups["uplift"]
-    if water is not None:
-        yield ""
-        yield from _uplift_lines(water)
-
-
-def _uplift_lines(water: xr.Dataset) -> Iterator[str]:
-    """Yield the uplift at the greatest load beside the diagrams of guidelines, one line per shear."""
-    yield "Uplift, over the linear diagram"
-    last = water.isel(step=-1) if "step" in water.dims else water
-    shears = np.atleast_1d(last["shear"].values) if "shear" in last.coords else [None]
-    for i, shear in enumerate(shears):
-        row = last.isel(shear=i) if "shear" in last.dims else last
-        place = "" if shear is None else f"at shear {quantity_text(float(shear), 'm')}: "
-        force = row["uplift_force"]
-        joint = float(force.sel(diagram="joint"))
-        share = f" ({joint / float(force.sel(diagram='linear')):.0%})" if "linear" in force.diagram else ""
-        yield f"  {place}{quantity_text(joint, 'N')}{share}" if np.isfinite(joint) else f"  {place}no balance"
-
-
-def _closure_lines(laws: xr.Dataset | None, most: int = 4) -> Iterator[str]:
-    """Yield a line for each of a few shears: the law that its closures prefer, with its constants.
-
-    The column has room for `most` of them beside all else.
-    """
-    if laws is None:
-        return
-    seat = "from first touch"
-    if "seating_pressure" in laws:
-        seat = f"above {quantity_text(float(laws['seating_pressure']), 'Pa')}"
-    yield ""
-    yield f"Closure {seat}"
-    every = laws if "shear" in laws.dims else laws.expand_dims("shear")
-    meanings = str(laws["preferred_law"].attrs["flag_meanings"]).split()
-    shears = by_shear(every)
-    for i in _style.spread_indices(every.sizes["shear"], most):
-        law = every.isel(shear=i).squeeze()
-        name = meanings[int(law["preferred_law"])]
-        shear = f"v = {shears.labels[i]} {shears.unit}: " if shears.labels else ""
-        if not np.isfinite(float(law["closure_length"])):
-            yield f"  {shear}no law"
-        elif name == "hyperbolic":
-            yield f"  {shear}hyperbolic"
-            for constant, symbol, scale in (
-                ("greatest_closure", "Vm", scale_for("m", law["greatest_closure_low"])),
-                ("initial_stiffness", "Kni", PER_LENGTH),
-            ):
-                yield f"      {symbol} {_interval(law, constant, scale)}"
-        elif name == "exponential":
-            margin = float(law["closure_length_high"] - law["closure_length_low"]) / 2
-            length = scale_for("m", law["closure_length"])
-            values = [f"{value:.3g}" for value in length([float(law["closure_length"]), margin])]
-            yield f"  {shear}exponential, l {values[0]} ± {values[1]} {length.unit}"
-        else:
-            misfits = [quantity_text(float(law[f"{word}_misfit"]), "m") for word in meanings[1:3]]
-            yield f"  {shear}{name}, misfits {misfits[0]}, {misfits[1]}"
-
-
-def _interval(law: xr.Dataset, name: str, scale: Scale) -> str:
-    """Return a constant of a law with its interval."""
-    ends = [float(law[word]) for word in (name, f"{name}_low", f"{name}_high")]
-    value, low, high = (f"{float(scale(end)):.3g}" if np.isfinite(end) else "no bound" for end in ends)
-    return f"{value} ({low} to {high}) {scale.unit}"
 
 
 def _flow_panels(
@@ -321,11 +238,8 @@ def secant_stiffness(pressure: Any, closure: Any) -> Any:
 
 
 def _limits(groups: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterator[str]:
-    """Yield lines: the notes, what the criteria assume and where, and what the results say of themselves."""
+    """Yield lines: the notes, and what the results say of themselves."""
     texts = dict.fromkeys(notes)
-    envelope = groups["strength_envelope"]
-    if envelope is not None:
-        texts |= dict.fromkeys(_criteria(envelope))
     for name, data in groups.items():
         for variable in () if data is None else data.drop_vars("bulk_closure", errors="ignore").values():
             comment = str(variable.attrs.get("comment", ""))
@@ -338,14 +252,3 @@ def _limits(groups: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Itera
         )
     for text in texts:
         yield from textwrap.wrap(f"- {text}", 165, subsequent_indent="  ")  # the page, in 6.5 points
-
-
-def _criteria(envelope: xr.Dataset) -> Iterator[str]:
-    """Yield what each criterion assumes, and the normal stresses of those drawn at which it is in range."""
-    pressure = envelope["nominal_pressure"].values
-    in_range = envelope["in_range"].transpose("criterion", "nominal_pressure").values
-    for i, name in enumerate(words(envelope["criterion"])):
-        inside = pressure[in_range[i]]
-        ends = [quantity_text(value, "Pa") for value in (inside.min(), inside.max())] if inside.size else []
-        where = f"drawn in range from {' to '.join(ends)}" if ends else "out of its range here"
-        yield f"{name.replace('_', ' ')}: {words(envelope['assumption'])[i]}; {where}"

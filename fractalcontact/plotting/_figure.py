@@ -136,7 +136,7 @@ OPTIONS: dict[str, tuple[str, Test]] = {
     ),
     "figure": ("a Figure or SubFigure, or None", _is_sheet),
     "marked": ("a sequence of numbers", _are_numbers),
-    "notes": ("a sequence of words", _are_words),
+    **dict.fromkeys(("notes", "numbers"), ("a sequence of words", _are_words)),
     "panels": ("an integer >= 1", _is_count),
     "tree": ("a DataTree", lambda value: isinstance(value, xr.DataTree)),
     "units": UNITS_EXPECTED,

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.units import Scale, named_scale, number, scale_for
+from fractalcontact.base.units import PER_LENGTH, Scale, named_scale, number, scale_for
 from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -55,7 +55,6 @@ OWN_NAME = frozenset(
 )  # fmt: skip
 PLAIN = Scale(1.0, "")  # of a number without a unit
 PER_CENT = Scale(0.01, "%")  # of a share
-PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
 # the unit of practice, whatever the values
 USUAL = {
     **dict.fromkeys(

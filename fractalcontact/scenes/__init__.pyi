@@ -1,3 +1,4 @@
+from ._datasheet import datasheet as datasheet
 from ._export import export as export
 from ._export import tables as tables
 from ._html_report import report as report
@@ -13,6 +14,7 @@ from ._validation import validate as validate
 
 __all__ = [
     "Scene",
+    "datasheet",
     "export",
     "json_schema",
     "load",

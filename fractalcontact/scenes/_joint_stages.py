@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.study import MEMBER, group_of, provenance_of
-from fractalcontact.base.units import jrc_text, number
+from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
 from fractalcontact.scenes._result_tables import (
     Column,
     Rows,
@@ -164,13 +164,55 @@ def _worn_depth(state: xr.Dataset) -> Any:
     return state["wear_depth"].max("point", keep_attrs=True) if "wear_depth" in state else None
 
 
-def _at_pressures(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield what the criteria assume, and where they are used outside their range."""
-    if "assumption" in data:
-        names = [str(name) for name in data["criterion"].values]
-        texts = np.atleast_2d(data["assumption"].transpose(..., "criterion").values)  # of every member
-        lines = (f"{name}: {text}" for row in texts for name, text in zip(names, row, strict=True) if text)
-        yield from dict.fromkeys(lines)
+def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:
+    """Yield what each criterion assumes, and at which of the pressures it is in its range."""
+    data = tree["joints/strength_envelope"].to_dataset()
+    if "asperity_angle" in data:
+        yield f"asperity angle of the face: {amount(data['asperity_angle'])}"
+    pressure = data["nominal_pressure"]
+    for name in data["criterion"].values:
+        row = data.sel(criterion=name)
+        in_range = row["in_range"].all(set(row["in_range"].dims) - set(pressure.dims))  # of every member
+        inside = finite(pressure.where(in_range))
+        ends = (
+            dict.fromkeys(quantity_text(end, "Pa") for end in (inside.min(), inside.max()))
+            if inside.size
+            else ()
+        )
+        where = f"in its range from {' to '.join(ends)}" if ends else "out of its range at every pressure"
+        for text in dict.fromkeys(map(str, np.ravel(row["assumption"].values))):
+            yield f"{name}: {text}; {where}" if text else f"{name}: {where}"
+
+
+def _preferred_law(state: xr.Dataset) -> str:
+    """Return the law that the closures prefer, with its constants; of an ensemble the laws of its members."""
+    words = str(state["preferred_law"].attrs["flag_meanings"]).split()
+    names = [words[int(flag)] for flag in np.ravel(state["preferred_law"].values)]
+    if len(names) > 1:
+        return ", ".join(f"{name} {names.count(name)}" for name in dict.fromkeys(names))
+    state = state.squeeze()
+    if not np.isfinite(state["closure_length"]):
+        return "none"
+    if names[0] == "hyperbolic":
+        closure = scale_for("m", state["greatest_closure_low"])
+        greatest, stiffness = (
+            _with_ends(state, "greatest_closure", closure),
+            _with_ends(state, "initial_stiffness", PER_LENGTH),
+        )
+        return f"hyperbolic, Vm {greatest}, Kni {stiffness}"
+    if names[0] == "exponential":
+        return (
+            f"exponential, l {_with_ends(state, 'closure_length', scale_for('m', state['closure_length']))}"
+        )
+    misfits = (length(state[f"{word}_misfit"]) for word in ("exponential", "hyperbolic"))
+    return f"{names[0]}, misfits {', '.join(misfits)}"
+
+
+def _with_ends(state: xr.Dataset, name: str, scale: Scale) -> str:
+    """Return a constant of a law with its interval."""
+    ends = [float(scale(state[word])) for word in (name, f"{name}_low", f"{name}_high")]
+    value, low, high = (number(end) if np.isfinite(end) else "no bound" for end in ends)
+    return f"{value} ({low} to {high}) {scale.unit}"
 
 
 def _rigid_faces(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -350,6 +392,8 @@ STAGES = (
             Column("greatest closure", "greatest_closure", screen=False),
             Column("closure length", "closure_length", screen=False),
             Column("stiffness", "stiffness", screen=False),
+            Column("preferred law", _preferred_law, screen=False),
+            Column("seating pressure", "seating_pressure", screen=False),
         ),
         ("joints/closure",),
         takes="result",
@@ -435,6 +479,8 @@ STAGES = (
             JRC_COLUMN,
             Column("slope Z2", "profile_slope", 3),
             Column("scatter of the profiles", _jrc_scatter),
+            Column("read every", "lag", screen=False),
+            Column("regression over", "regression_interval", screen=False),
             remarks=_outside_scale,
         ),
     ),
@@ -480,7 +526,7 @@ STAGES = (
             Column("shear strength", "shear_strength"),
             Column("friction angle", "friction_angle", screen=False),
             Column("in its range", "in_range", screen=False),
-            remarks=_at_pressures,
+            remarks=_criteria,
         ),
         one_direction=True,
     ),

@@ -111,6 +111,12 @@ class ResultTable:
         cells = tuple((*ours.get(key, empty[0]), *theirs.get(key, empty[1])) for key in keys)
         return replace(self, keys=keys, heads=(*self.heads, *other.heads), cells=cells)
 
+    def selected(self, heads: Sequence[str]) -> ResultTable:
+        """Return the table with these of its columns, in this order, as far as it has them."""
+        places = [self.heads.index(head) for head in heads if head in self.heads]
+        cells = tuple(tuple(row[i] for i in places) for row in self.cells)
+        return replace(self, heads=tuple(self.heads[i] for i in places), cells=cells)
+
     def shortened(self, most: int) -> ResultTable:
         """Return at most so many rows, evenly spread from the first to the last."""
         if len(self.keys) <= most:

@@ -22,10 +22,10 @@ from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import PARTIAL_RESULT, RESULT, locked, written_whole
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK, most_workers
-from fractalcontact.base.study import of_member, provenance_of
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
-from fractalcontact.scenes._caveats import caveats
+from fractalcontact.scenes._datasheet import datasheet
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._export import tables
 from fractalcontact.scenes._html_report import page_contents, pictures_of, write_report
@@ -278,14 +278,12 @@ def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) ->
 
 
 def _draw_datasheet(tree: xr.DataTree, target: Path) -> None:
-    """Write the page about the joint as PDF; of an ensemble that of its first member."""
+    """Write the page about the joint as PDF."""
     from matplotlib.figure import Figure
 
-    from fractalcontact import plotting
-
-    first, page = of_member(tree, 0), Figure()
+    page = Figure()
     with DRAWING_LOCK, written_whole(target) as temporary:
-        plotting.datasheet(first, notes=caveats(first), figure=page)
+        datasheet(tree, figure=page)
         page.savefig(
             temporary, format="pdf", metadata={"CreationDate": None, "Creator": _results_folder.SOFTWARE}
         )

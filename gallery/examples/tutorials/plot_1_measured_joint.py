@@ -105,4 +105,4 @@ datasheet = true
 )
 study = fc.scenes.run("joint.toml", out="joint", progress=False)
 print(sorted(path.name for path in Path("joint").iterdir() if not path.name.startswith(".")))
-sheet = fc.plotting.datasheet(study)
+sheet = fc.scenes.datasheet(study)

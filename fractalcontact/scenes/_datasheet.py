@@ -1,0 +1,82 @@
+"""The datasheet of a joint: its curves on one page, with rows of the tables of the study beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import xarray as xr
+
+from fractalcontact.base.study import group_of, of_member
+from fractalcontact.base.tables import table
+from fractalcontact.base.validation import Problems
+from fractalcontact.scenes._caveats import caveats
+from fractalcontact.scenes._result_tables import ResultTable, table_of
+from fractalcontact.scenes._stages import STAGES
+from fractalcontact.scenes._summary import written_rows
+
+# by group, columns of the table that its stage declares
+SHOWN = {
+    "joints/roughness_coefficient": ("JRC", "scatter of the profiles", "read every", "regression over"),
+    "joints/directional_roughness": ("largest roughness metric", "smallest roughness metric"),
+    "joints/strength_envelope": (),  # its remarks alone: the page has its curves
+    "joints/direct_shear": ("peak strength", "friction angle", "residual strength"),
+    "joints/uplift": ("uplift", "of the linear diagram"),
+    "joints/closure_laws": ("preferred law", "seating pressure"),
+}
+
+
+def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
+    """Draw one page about a joint: roughness, strength, stiffness, aperture, flow, and limits of validity.
+
+    The numbers are those of the summary and the report. Of an ensemble they are those of its first member.
+
+    Parameters
+    ----------
+    tree : DataTree
+        From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups of joints that
+        `fractalcontact.plotting.datasheet` names. Panels without data stay empty.
+    figure : Figure, optional
+        An empty figure of matplotlib, which becomes the page: A4, upright. Default: a new figure.
+
+    Returns
+    -------
+    dict of str to Axes
+        The panels by what they show.
+
+    Raises
+    ------
+    InvalidInput
+        The study has none of these groups.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> import xarray as xr
+    >>> surface = fc.surfaces.fbm((64, 64), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
+    >>> envelope = fc.joints.strength_envelope(
+    ...     surface, nominal_pressure=[1e6, 4e6], wall_strength=6e7, basic_friction_angle=30
+    ... )
+    >>> list(fc.scenes.datasheet(xr.DataTree.from_dict({"/joints/strength_envelope": envelope})))
+    ['strength', 'normal stiffness', 'mean gap', 'transmissivity']
+    """
+    with Problems("fractalcontact.scenes.datasheet") as problems:
+        problems.tree("tree", tree)
+    from fractalcontact import plotting  # only where figures are wanted
+
+    study = of_member(tree, 0)
+    shown = list(_tables(study))
+    # the page has room for so many characters beside the strength
+    texts = [f"{each.title}\n{table(written_rows(each), 60, rule=False)}" for each in shown if each.heads]
+    remarks = [remark for each in shown for remark in each.remarks]
+    lines = "\n\n".join(texts).splitlines()
+    return plotting.datasheet(study, numbers=lines, notes=[*caveats(study), *remarks], figure=figure)
+
+
+def _tables(study: xr.DataTree, most: int = 4) -> Iterator[ResultTable]:
+    """Yield the tables of the page with the columns that it shows, and at most so many rows."""
+    for name, columns in SHOWN.items():
+        data, rows = group_of(study, name), STAGES[name].rows
+        made = table_of(rows, study, data) if data is not None and rows is not None else None
+        if made is not None:
+            yield made.selected(columns).shortened(most)
