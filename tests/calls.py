@@ -2,11 +2,12 @@
 
 Tests of what all functions have in common take it from here: labels, files, coordinates of the user's own,
 wrong arguments, missing numbers, threads and processes, damaged arguments. A new function needs one line in
-`CALLS`.
+`CALLS`, a figure with the name of a function none.
 """
 
 import functools
 import importlib
+import inspect
 import tempfile
 from pathlib import Path
 
@@ -60,31 +61,6 @@ def study():
 
 
 @functools.cache
-def rubbed():
-    return fc.joints.friction(slid())
-
-
-@functools.cache
-def islands():
-    return fc.domains.islands(pressed()["state"])
-
-
-@functools.cache
-def lacunarity():
-    return fc.domains.lacunarity(pressed()["state"])
-
-
-@functools.cache
-def boxes():
-    return fc.domains.box_dimension(pressed()["state"])
-
-
-@functools.cache
-def flow():
-    return fc.joints.transmissivity(pressed()["gap"])
-
-
-@functools.cache
 def laws():
     return fc.joints.closure_laws(closed())
 
@@ -114,27 +90,6 @@ def curve():
 def overview():
     heights = ("scan", [1e-6, 2e-6, 4e-6], {"units": "m", "long_name": "rms height"})
     return xr.Dataset({"rms_height": heights}, coords={"scan": ["a.sur", "b.sur", "c.sur"]})
-
-
-@functools.cache
-def roses():
-    return fc.joints.directional_roughness(rough())
-
-
-@functools.cache
-def envelope():
-    loads = {"nominal_pressure": [1e5, 1e6], "wall_strength": 1e8, "basic_friction_angle": 30}
-    return fc.joints.strength_envelope(rough(), **loads)
-
-
-@functools.cache
-def memory():
-    return fc.joints.decorrelation_length(crack())
-
-
-@functools.cache
-def delta():
-    return fc.joints.delta_dimension(crack(), shear=[1e-4, 2e-4])
 
 
 @functools.cache
@@ -304,39 +259,44 @@ CALLS = {
     "plotting.pressure_distribution": lambda: {"result": distributed()},
     "plotting.closure_laws": lambda: {"closure": closed(), "laws": laws()},
     "plotting.dilatancy": lambda: {"dilatancy": slid(), "direction": "E"},
-    "plotting.friction": lambda: {"result": rubbed(), "direction": "E"},
-    "plotting.islands": lambda: {"result": islands()},
-    "plotting.lacunarity": lambda: {"result": lacunarity()},
-    "plotting.box_dimension": lambda: {"result": boxes()},
-    "plotting.signature": lambda: {"result": boxes()},
+    "plotting.friction": lambda: {"result": result_of("joints.friction"), "direction": "E"},
     "plotting.first_contact": lambda: {"result": pressed()},
     "plotting.alluvial": lambda: {"result": result_of("domains.lineage")},
     "plotting.lineage": lambda: {"result": result_of("domains.evolution")},
-    "plotting.hydraulic_aperture": lambda: {"result": flow()},
+    "plotting.hydraulic_aperture": lambda: {"result": result_of("joints.transmissivity")},
     "plotting.uplift": lambda: {"result": watered()},
     "plotting.dimensions": lambda: {"estimates": estimates()},
     "plotting.dimension_curves": lambda: {"curves": curve(), "estimates": estimates()},
     "plotting.scans": lambda: {"overview": overview()},
-    "plotting.directional_roughness": lambda: {"result": roses()},
-    "plotting.strength_envelope": lambda: {"result": envelope()},
-    "plotting.correlation": lambda: {"memory": memory()},
-    "plotting.delta_dimension": lambda: {"dimension": delta()},
-    "plotting.area_dimension": lambda: {"result": result_of("joints.area_dimension")},
+    "plotting.correlation": lambda: {"memory": result_of("joints.decorrelation_length")},
     "plotting.datasheet": lambda: {
         "tree": xr.DataTree.from_dict({"/joints/closure_laws": laws()}), "notes": ["a note"],
         "numbers": ["a number"],
     },
     "plotting.error_against_time": lambda: {"measured": measured()},
     "plotting.estimator_errors": lambda: {"bench": estimators()},
-    "plotting.scaling": lambda: {"result": result_of("dimensions.scaling")},
-    "plotting.self_weight": lambda: {"result": result_of("joints.self_weight")},
-    "plotting.shear_curve": lambda: {"result": result_of("joints.direct_shear")},
     "plotting.slip_loops": lambda: {"result": result_of("joints.partial_slip")},
     "plotting.draw": lambda: {"tree": study(), "folder": PLACE / "figures"},
     "accuracy.benchmarks": lambda: {"subpackage": "surfaces"},
     "accuracy.summary": lambda: {"results": estimators()},
     "accuracy.estimators": lambda: {"hurst": 0.5, "sizes": 8, "families": "nothing", "members": 2},
 }  # fmt: skip
+
+
+def _named_alike():
+    """Yield the call of every figure that has the name of a function: with the result of that function."""
+    for name in set(fc.plotting.__all__):
+        subpackage = next((each for each in SUBPACKAGES if f"{each}.{name}" in CALLS), None)
+        if subpackage is not None:
+            argument = next(iter(inspect.signature(getattr(fc.plotting, name)).parameters))
+            yield f"plotting.{name}", functools.partial(_call, argument, f"{subpackage}.{name}")
+
+
+def _call(argument, source):
+    return {argument: result_of(source)}
+
+
+CALLS = dict(_named_alike()) | CALLS
 
 # this is refused as it stands, because it would take long
 REFUSED = ("accuracy.estimators",)

@@ -10,7 +10,8 @@ import xarray as xr
 
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._fields import MAPS
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
     extent_of,
     nearest,
@@ -21,7 +22,16 @@ from fractalcontact.plotting._inputs import (
     words,
 )
 from fractalcontact.plotting._line_panel import LinePanel
-from fractalcontact.plotting._paths import PATH, by_shear, path_axis
+from fractalcontact.plotting._paths import (
+    PATH,
+    at_end,
+    at_shear,
+    by_decades,
+    by_shear,
+    loaded_steps,
+    middle_shear,
+    path_axis,
+)
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, scale_of
 
@@ -235,3 +245,19 @@ def _state(data: xr.Dataset) -> str:
     present = [name for name in present if not (name == "nominal_pressure" and "effective_stress" in present)]
     texts = {name: scale_of(data[name]).text(np.ravel(data[name].values)[0]) for name in present}
     return ", ".join(f"{shown[name]} {text}" for name, text in texts.items() if text != "-")
+
+
+def _of_joint(data: xr.Dataset) -> Any:
+    """Draw the closure laws, with the steps marked whose maps `joint_contact_domains` shows."""
+    every = data.expand_dims([dim for dim in ("shear", "step") if dim not in data.dims])
+    shear = middle_shear(data)
+    steps = loaded_steps(at_shear(every, shear), MAPS) if "state" in data else ()
+    return closure_laws(data, shear=shear, marked=steps)
+
+
+FIGURES = (
+    StudyFigure("joint_closure", "joints/closure", "interface_closure", _of_joint),
+    StudyFigure("closure_law", "contact", "closure", by_decades(closure_laws)),
+    StudyFigure("hydraulic_aperture", "joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
+    StudyFigure("uplift", "joints/uplift", "uplift_profile", at_end(uplift, *PATH)),
+)

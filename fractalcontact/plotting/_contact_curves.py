@@ -11,7 +11,7 @@ import numpy as np
 from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _paths, _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH
@@ -302,3 +302,12 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
         panel.finish(legend=y is sticking)
     shown[1].set_ylim(0, 105)
     return shown
+
+
+FIGURES = (
+    StudyFigure("joint_contact_area", "joints/closure", "contact_fraction", contact_area),
+    StudyFigure("contact_area", "contact", "contact_fraction", _paths.by_decades(contact_area)),
+    StudyFigure("area_dimension", "joints/area_dimension", "resolution", area_dimension),
+    StudyFigure("slip_loops", "partial_slip", "stick_area", slip_loops),
+    StudyFigure("joint_slip_loops", "joints/partial_slip", "stick_area", slip_loops),
+)

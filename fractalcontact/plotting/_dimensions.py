@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import as_dataset, quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
@@ -381,3 +381,12 @@ def _is_full_circle(azimuth: Any) -> bool:
     angles = np.sort(np.asarray(azimuth, dtype=np.float64) % 360.0)
     gaps = np.diff(np.append(angles, angles[0] + 360.0))
     return bool(gaps.max() <= 90.0)
+
+
+FIGURES = (
+    StudyFigure("dimensions", "dimensions", "hurst", dimensions),
+    StudyFigure("dimension_curves", "dimensions/*", "a scaling curve", dimension_curves),
+    StudyFigure(
+        "directional_roughness", "joints/directional_roughness", "roughness_metric", directional_roughness
+    ),
+)

@@ -14,7 +14,7 @@ from fractalcontact.base.regression import is_far
 from fractalcontact.base.study import MEMBER
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import result_of
 from fractalcontact.plotting._line_panel import BAND_OPACITY, LinePanel
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
@@ -200,3 +200,6 @@ def _draw_distribution(ax: Any, data: Any, name: str) -> None:
         )  # fmt: skip
     ax.set_yticks([])
     ax.margins(y=0.08)  # of the name of the highest
+
+
+FIGURES = (StudyFigure("scans", "overview", "status", scans),)

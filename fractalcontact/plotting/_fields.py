@@ -10,11 +10,21 @@ import xarray as xr
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import as_dataset, extent_of, require_known_dims, result_of, table
-from fractalcontact.plotting._paths import PATH, at_shear, load_of, select_path, shear_text
+from fractalcontact.plotting._paths import (
+    PATH,
+    at_end,
+    at_shear,
+    load_of,
+    middle_shear,
+    select_path,
+    shear_text,
+)
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Units, name_of
+
+MAPS = 6  # of contact domains in a figure
 
 
 @figure
@@ -23,7 +33,7 @@ def contact_domains(
     *,
     shear: float | None = None,
     normal_force: float | None = None,
-    panels: int = 6,
+    panels: int = MAPS,
     zoom: float | None = None,
     units: Units | None = None,
     axes: Panels | None = None,
@@ -274,3 +284,33 @@ def first_contact(
     _maps.draw_values(ax, plane, missing=_style.OPEN_COLOUR, name=title, log=log, clipped=0.0, readable=True)
     ax.set_title(shear_text(path, data))
     return ax
+
+
+def _surface(data: xr.Dataset, delta: xr.Dataset | None = None) -> Any:
+    return surface(data, block=None if delta is None or "height" not in delta else delta["height"])
+
+
+def _delta_surface(data: xr.Dataset) -> Any:
+    last = data.isel(shear=-1) if "shear" in data.dims else data
+    return surface(last, title=f"delta-surface, {shear_text(last)}".rstrip(", "))
+
+
+def _along_load(data: xr.Dataset) -> Any:
+    return contact_domains(data, shear=middle_shear(data))
+
+
+def _along_shear(data: xr.Dataset) -> Any:
+    return contact_domains(data, normal_force=float(np.nanmax(data["normal_force"].values)))
+
+
+FIGURES = (
+    StudyFigure("surface", "surfaces", "height", _surface, beside={"delta": "joints/delta_surface"}),
+    StudyFigure("delta_surface", "joints/delta_surface", "height", _delta_surface),
+    StudyFigure("joint_contact_domains", "joints/closure", "state", _along_load),
+    StudyFigure("joint_contact_domains_along_shear", "joints/closure", "state", _along_shear, PATH),
+    StudyFigure("joint_first_contact", "joints/closure", "state", first_contact, ("step",)),
+    StudyFigure("contact_domains", "contact", "state", contact_domains),
+    StudyFigure("first_contact", "contact", "state", first_contact, ("step",)),
+    StudyFigure("slip_domains", "partial_slip", "slip_state", at_end(contact_domains, "shear")),
+    StudyFigure("joint_slip_domains", "joints/partial_slip", "slip_state", at_end(contact_domains, "shear")),
+)

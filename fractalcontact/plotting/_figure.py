@@ -1,4 +1,4 @@
-"""What all public figures share: options checked by their names, and the end of their docstrings."""
+"""What all figures share: checked options, the end of their docstrings, and what a study needs for one."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import functools
 import inspect
 import math
 from collections.abc import Callable, Mapping
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeAlias, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -18,6 +18,25 @@ from fractalcontact.plotting._units import UNITS_EXPECTED
 P = ParamSpec("P")
 R = TypeVar("R")
 Test: TypeAlias = Callable[[Any], bool]
+Drawing: TypeAlias = Callable[
+    ..., Any
+]  # of the data and of what stands beside them; returns Axes, or several
+
+
+class StudyFigure(NamedTuple):
+    """A figure of a study: its file, the group and the variable it is drawn from, the drawing and its needs.
+
+    Without a variable it is drawn from any Dataset. The `dims` are longer than one; options of the drawing
+    take the groups that `beside` names. Each module of figures ends with its own, and `_draw` has all.
+    """
+
+    file: str
+    group: str
+    variable: str
+    draw: Drawing
+    dims: tuple[str, ...] = ()
+    beside: Mapping[str, str] = {}
+
 
 # of options, where the docstring of a figure does not explain them itself
 PARAGRAPHS = {

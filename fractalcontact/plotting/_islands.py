@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
     as_dataset,
     nearest,
@@ -308,3 +308,10 @@ def _stacked(island: Array, order: Array, width: Array) -> Array:
     low = np.empty(width.size)
     low[places] = above - above[first][ribbon]
     return low
+
+
+FIGURES = (
+    StudyFigure("islands", "domains/islands", "label", islands),
+    StudyFigure("lineage", "domains/evolution", "births", lineage),
+    StudyFigure("alluvial", "domains/lineage", "common_cells", alluvial),
+)

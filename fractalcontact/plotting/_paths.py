@@ -10,6 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
+from fractalcontact.plotting._figure import Drawing
 from fractalcontact.plotting._inputs import as_dataset, nearest, quantity, table, words
 from fractalcontact.plotting._line_panel import Family, ordered
 from fractalcontact.plotting._style import spread_indices
@@ -148,6 +149,27 @@ def select_path(data: xr.Dataset, shear: float | None, normal_force: float | Non
             problems.require("normal_force" in data.variables, "result", "the variable 'normal_force'", NONE)
     is_along_shear = normal_force is not None or (data.sizes["step"] == 1 and shear is None)
     return states_along(data, "shear" if is_along_shear else "step", shear, normal_force, most)
+
+
+def middle_shear(data: xr.Dataset) -> float | None:
+    """Return the middle one of the shears of a result."""
+    shears = np.atleast_1d(data["shear"].values) if "shear" in data.coords else np.empty(0)
+    return float(shears[shears.size // 2]) if shears.size else None
+
+
+def by_decades(figure: Drawing) -> Drawing:
+    """Return a drawing with logarithmic axes where linear ones would hide all loads but the largest."""
+
+    def draw(data: xr.Dataset) -> Any:
+        force = np.asarray(data["normal_force"].values, float) if "normal_force" in data else np.empty(0)
+        return figure(data, log=_style.needs_log_axis(force[force > 0]))
+
+    return draw
+
+
+def at_end(figure: Drawing, *dims: str) -> Drawing:
+    """Return a drawing at the greatest shear, or under the greatest load."""
+    return lambda data: figure(data.isel({dim: -1 for dim in dims if dim in data.dims}))
 
 
 def loaded_steps(path: xr.Dataset, most: int) -> list[int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,7 +12,7 @@ import xarray as xr
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.units import Scale
 from fractalcontact.plotting import _maps, _paths, _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
     as_dataset,
     quantity,
@@ -301,3 +302,19 @@ def _draw_dimension(
     if "null_dimension" in path:
         panel.curves("random null", "null_dimension", key=CELLS_NULL, **_style.DASHED)
     return panel
+
+
+_lacunarity_maps = functools.partial(lacunarity, maps=True)
+FIGURES = (
+    StudyFigure("box_dimension", "domains/box_dimension", "box_dimension", box_dimension),
+    StudyFigure("signature", "domains/signature", "local_slope", signature),
+    StudyFigure("local_slopes", "domains/box_dimension", "local_slope", signature),
+    StudyFigure("minkowski_dimension", "domains/minkowski_dimension", "minkowski_dimension", box_dimension),
+    StudyFigure(
+        "correlation_dimension", "domains/correlation_dimension", "correlation_dimension", box_dimension
+    ),
+    StudyFigure("lacunarity", "domains/lacunarity", "lacunarity", lacunarity),
+    StudyFigure(
+        "lacunarity_maps", "domains/lacunarity", "lacunarity", _lacunarity_maps, ("step", "box_size")
+    ),
+)

@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _paths, _style
-from fractalcontact.plotting._figure import figure
+from fractalcontact.plotting._figure import Drawing, StudyFigure, figure
 from fractalcontact.plotting._inputs import nearest, quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel, distinct, ordered
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
@@ -391,3 +391,35 @@ def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | No
     for name, method, own, marker in zip(DIMENSIONS, methods.labels, methods.styles, "osD", strict=True):
         panel.line(method, shear.values, panel.values(name), marker=marker, ms=3.5, **own)
     return panel.finish(log="x" if float(data["shear"].min()) > 0 else "")
+
+
+def _evenly_sampled(figure: Drawing) -> Drawing:
+    """Return a drawing of the evenly sampled shears; under forces of one direction, which fits a figure."""
+
+    def draw(data: xr.Dataset) -> Any:
+        several = "step" in data.dims and data.sizes.get("direction", 1) > 1
+        direction = words(data["direction"])[0] if several else None
+        return figure(data, direction=direction, reach=_paths.evenly_sampled_reach(data))
+
+    return draw
+
+
+SHEAR_TEST, SHEAR_CURVE = "joints/direct_shear", "joints/shear_curve"
+FIGURES = (
+    StudyFigure("rigid_dilatancy", "joints/rigid_dilatancy", "rigid_dilatancy", dilatancy),
+    StudyFigure("joint_dilatancy", "joints/elastic_dilatancy", "dilatancy", _evenly_sampled(dilatancy)),
+    StudyFigure("friction", "joints/friction", "friction_angle", _evenly_sampled(friction)),
+    StudyFigure("delta_dimension", "joints/delta_dimension", "variogram_dimension", delta_dimension),
+    StudyFigure("self_weight", "joints/self_weight", "structure_size", self_weight),
+    StudyFigure("correlation", "joints/decorrelation_length", "correlation", correlation),
+    StudyFigure(
+        "strength_envelope",
+        "joints/strength_envelope",
+        "shear_strength",
+        strength_envelope,
+        beside={"tests": SHEAR_TEST},
+    ),
+    # of one file: the first that the study has data for is drawn
+    StudyFigure("shear_curve", SHEAR_TEST, "shear_stress", shear_curve, beside={"beside": SHEAR_CURVE}),
+    StudyFigure("shear_curve", SHEAR_CURVE, "shear_stress", shear_curve),
+)

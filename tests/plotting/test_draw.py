@@ -12,8 +12,10 @@ from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.schema import label
 
-FIGURES = [
+FIGURES = [  # in the order of the groups of the study
     "surface",
+    "dimensions",
+    "dimension_curves",
     "delta_surface",
     "joint_closure",
     "joint_contact_area",
@@ -22,14 +24,12 @@ FIGURES = [
     "joint_first_contact",
     "rigid_dilatancy",
     "joint_dilatancy",
-    "dimensions",
-    "dimension_curves",
     "friction",
+    "hydraulic_aperture",
     "box_dimension",
     "lacunarity",
     "lacunarity_maps",
     "islands",
-    "hydraulic_aperture",
 ]
 
 
