@@ -62,6 +62,8 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
     """
     with Problems("fractalcontact.scenes.datasheet") as problems:
         problems.tree("tree", tree)
+        is_sheet = figure is None or hasattr(figure, "subfigures")
+        problems.require(is_sheet, "figure", "a Figure or SubFigure, or None", figure)
     from fractalcontact import plotting  # only where figures are wanted
 
     study = of_member(tree, 0)
