@@ -2,7 +2,7 @@
 
 Tests of what all functions have in common take it from here: labels, files, coordinates of the user's own,
 wrong arguments, missing numbers, threads and processes, damaged arguments. A new function needs one line in
-`CALLS`, a figure with the name of a function none.
+`CALLS`, unless it needs `SAMPLES` alone, or is a figure with the name of a function.
 """
 
 import functools
@@ -154,33 +154,13 @@ CALLS = {
     "surfaces.read_points": lambda: {"path": points_file()},
     "surfaces.fit_plane": lambda: {"points": cloud()},
     "surfaces.from_points": lambda: {"points": cloud(), "spacing": 1e-3},
-    "surfaces.level": lambda: {"surface": rough()},
     "surfaces.gaussian_filter": lambda: {"surface": rough(), "cutoff": 4.0 * SPACING},
-    "surfaces.texture": lambda: {"surface": rough()},
     "surfaces.fill": lambda: {"surface": rough().where(rough().x > 2e-4)},
-    "surfaces.despike": lambda: {"surface": rough()},
-    "surfaces.describe": lambda: {"surface": rough()},
-    **{
-        f"dimensions.{name}": lambda: {"surface": rough()}
-        for name in (
-            "covering",
-            "cube_counts",
-            "detrended_fluctuation",
-            "directions",
-            "divider",
-            "height_lacunarity",
-            "higuchi",
-            "roughness_length",
-            "variation",
-        )
-    },
     "dimensions.estimate": lambda: {"surface": rough(), "methods": ["variogram", "likelihood"]},
     "dimensions.hurst_map": lambda: {"surface": rough(), "window": 1.6e-3},
     "dimensions.scaling": lambda: {"surface": rough(48)},
     "dimensions.pool": lambda: {"scans": estimates()},
-    "dimensions.waves": lambda: {"surface": rough()},
     "dimensions.spectrum": lambda: {"surface": periodic()},
-    "dimensions.variogram": lambda: {"surface": rough()},
     "contact.effective_modulus": lambda: {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
     "contact.effective_poisson": lambda: {"young": 1e9, "poisson": 0.2, "young2": 1e9, "poisson2": 0.2},
     "contact.theories": lambda: {"surface": rough(), "contact_modulus": 1e9, "nominal_pressure": [1e4, 1e5]},
@@ -211,29 +191,16 @@ CALLS = {
     },
     "joints.hydraulic_aperture": lambda: {"aperture": 1e-4, "roughness_coefficient": 10},
     "joints.closure": lambda: {"crack": crack(), "shear": [1e-4], "normal_force": [1.0, 10.0]},
-    "joints.closure_laws": lambda: {"closure": closed()},
-    "joints.decorrelation_length": lambda: {"crack": crack()},
     "joints.delta_dimension": lambda: {"crack": crack(), "shear": [1e-4]},
     "joints.delta_surface": lambda: {"crack": crack(), "shear": [1e-4], "direction": "W"},
     "joints.dilatancy": lambda: {"crack": crack(), "shear": [0.0, 1e-4]},
-    "joints.directional_roughness": lambda: {"surface": rough()},
-    "joints.friction": lambda: {"dilatancy": slid()},
     "joints.register": lambda: {"lower": rough(), "upper": rough() + 1e-5},
     "joints.roughness_coefficient": lambda: {"surface": rough(), "lag": 4e-4},
     "joints.size_effect": lambda: {"size_ratio": [2.0, 4.0], "contact_dimension": 1.5},
     "joints.strength_envelope": lambda: {
         "surface": rough(), "nominal_pressure": [1e5, 1e6], "wall_strength": 1e8, "basic_friction_angle": 30,
     },
-    "joints.transmissivity": lambda: {"gap": pressed()["gap"]},
     "joints.uplift": lambda: {"gap": pressed()["gap"], "upstream_pressure": 1e5, "drains": [(8e-4, 8e-4)]},
-    **{
-        f"domains.{name}": lambda: {"mask": pressed()["state"]}
-        for name in (
-            "boundary_dimension", "box_counts", "box_dimension", "correlation_dimension", "describe",
-            "evolution", "generalised_dimensions", "hausdorff_content", "islands", "lacunarity", "lineage",
-            "minkowski_dimension", "percolation", "signature",
-        )
-    },
     "domains.area_dimension": lambda: {"masks": [pressed()["state"], pressed()["state"][..., ::2, ::2]]},
     "domains.read_mask": lambda: {"path": image_file(), "spacing": SPACING},
     "save": lambda: {"result": rough(), "path": PLACE / "saved.nc"},
@@ -283,20 +250,47 @@ CALLS = {
 }  # fmt: skip
 
 
+# of functions that need nothing else, and are not in `CALLS`
+SAMPLES = {
+    "surface": rough,
+    "crack": crack,
+    "mask": lambda: pressed()["state"],
+    "gap": lambda: pressed()["gap"],
+    "closure": closed,
+    "dilatancy": slid,
+}
+
+
+def _called_with_samples():
+    """Yield the call of every function that needs samples alone, and has none of its own."""
+    for subpackage in SUBPACKAGES:
+        module = importlib.import_module(f"fractalcontact.{subpackage}")
+        for name in module.__all__:
+            parameters = inspect.signature(getattr(module, name)).parameters.values()
+            required = [each.name for each in parameters if each.default is each.empty]
+            if required and set(required) <= SAMPLES.keys() and f"{subpackage}.{name}" not in CALLS:
+                yield f"{subpackage}.{name}", functools.partial(_samples, required)
+
+
+def _samples(names):
+    return {name: SAMPLES[name]() for name in names}
+
+
 def _named_alike():
-    """Yield the call of every figure that has the name of a function: with the result of that function."""
-    for name in set(fc.plotting.__all__):
-        subpackage = next((each for each in SUBPACKAGES if f"{each}.{name}" in CALLS), None)
-        if subpackage is not None:
+    """Yield the call of every figure with the name of a function, if it has none: with its result."""
+    for name in fc.plotting.__all__:
+        source = next((f"{each}.{name}" for each in SUBPACKAGES if f"{each}.{name}" in CALLS), None)
+        if source is not None and f"plotting.{name}" not in CALLS:
             argument = next(iter(inspect.signature(getattr(fc.plotting, name)).parameters))
-            yield f"plotting.{name}", functools.partial(_call, argument, f"{subpackage}.{name}")
+            yield f"plotting.{name}", functools.partial(_result_as, argument, source)
 
 
-def _call(argument, source):
+def _result_as(argument, source):
     return {argument: result_of(source)}
 
 
-CALLS = dict(_named_alike()) | CALLS
+CALLS |= dict(_called_with_samples())
+CALLS |= dict(_named_alike())
 
 # this is refused as it stands, because it would take long
 REFUSED = ("accuracy.estimators",)

@@ -31,11 +31,12 @@ from fractalcontact.base import resources
 SCENE = SOUND.replace("[48, 48]", "[24, 24]").replace("2.4e-3", "1e-3")
 SCENE += 'dimensions = ["variogram"]\nfigures = true\n'
 LIMIT = 240.0  # seconds after which a process counts as hanging
-# classes and constants
+# classes, and a figure (see below)
 LEFT_OUT = {
     "accuracy.Benchmark",
     "accuracy.Method",
     "scenes.Scene",
+    "scenes.datasheet",
     "surfaces.SelfAffine",
 }
 # figures draw on the axes of a caller what others have computed, and Matplotlib promises nothing for threads;
