@@ -16,7 +16,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
 from fractalcontact.dimensions._likelihood import fitted_modes, likelihood
 from fractalcontact.dimensions._records import NORMAL
-from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD, tail
+from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD
 from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -197,8 +197,7 @@ def _log_power(bins: Bins, form: int) -> Array:
     logs = np.empty((_EXPONENTS.size, bins.level.size))
     for row, hurst in zip(logs, _EXPONENTS, strict=True):
         inside = min(max(float(hurst), LOWEST), HIGHEST)
-        weight = weights(inside, bins.t)
-        weight[-1] *= tail(inside, bins.t[-1], 0.0, form, bins.axes)
+        weight = weights(inside, bins.t, form, bins.axes)
         row[:] = np.log(bins.tables[form, 0] @ weight) - 2.0 * (hurst - inside) * bins.lnq
     return logs
 

@@ -42,6 +42,10 @@ class Form:
 # ALIASED: blurred, then sampled; FILTERED: sampled, then blurred by Gaussian weights of the neighbours;
 # UNALIASED: without waves that are shorter than two points, as a part of a synthetic periodic surface
 FORMS = {ALIASED: Form(0.75, 0.4), FILTERED: Form(0.0, 0.4), UNALIASED: Form(0.25, 0.2)}
+# ln(H / (1 - H)) of the exponents of a table; between them the logarithms of bins are off by less than 1e-4
+_LOGITS = np.linspace(-5.3, 5.3, 43)
+# of the cubics that are one at -1, 0, 1 or 2, and zero at the others: coefficients of the powers, by column
+_CUBICS = np.array([[0, 6, 0, 0], [-2, -3, 6, -1], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6.0
 FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
 
 
@@ -50,11 +54,31 @@ def mixture(lowest: int) -> Array:
     return 2.0 ** np.arange(lowest, HIGHEST)
 
 
-def weights(hurst: float, t: Array) -> Array:
-    """Return the weights of the Gaussians for heights of unit rms increment over one x spacing."""
-    weight = t**-hurst
-    longer = t[0] ** (1.0 - hurst) * 2.0 ** (hurst - 1.0) / (1.0 - 2.0 ** (hurst - 1.0))
-    unit = longer + weight @ -np.expm1(-t) + weight[-1] * 2.0**-hurst / (1.0 - 2.0**-hurst)
+def weights(
+    hurst: Array | float, t: Array, form: int, axes: int, spread: Array | float = 0.0, terms: int = 40
+) -> Array:
+    """Return the weights of the Gaussians for heights of unit rms increment over one x spacing, (..., t).
+
+    The last one holds all shorter Gaussians, of which `terms` are summed and the others form a geometric
+    series. `hurst` and `spread` have one shape, or are numbers.
+    """
+    h = np.asarray(hurst)[..., None]
+    ratio, blur = 2.0**-h, 4.0 * t[-1] * np.square(spread)[..., None]
+    weight = t**-h
+    longer = t[0] ** (1.0 - h) * 2.0 ** (h - 1.0) / (1.0 - 2.0 ** (h - 1.0))
+    shorter = weight[..., -1:] * ratio / (1.0 - ratio)
+    unit = longer + (weight * -np.expm1(-t)).sum(axis=-1, keepdims=True) + shorter
+    # over its own term: without aliases a Gaussian counts by its density, 2^(-d / 2) of the one before
+    number = np.arange(terms + 1.0)
+    if form == UNALIASED:
+        share, falls = 2.0 ** (-0.5 * axes * number), np.full(h.shape, 0.5 * axes)
+    else:
+        blur = np.zeros_like(blur) if form == FILTERED else blur
+        share = ((1.0 + blur) / (1.0 + blur * 2.0**number)) ** (0.5 * axes)
+        falls = np.where(blur > 0.0, 0.5 * axes, 0.0)
+    series = ratio**number * share
+    rest = series[..., -1:] / (1.0 - 2.0 ** -(h + falls))
+    weight[..., -1:] *= series[..., :-1].sum(axis=-1, keepdims=True) + rest
     return np.asarray(0.5 * weight / unit)
 
 
@@ -169,6 +193,84 @@ class Bins:
     lnq: Array
     extent: float
     axes: int
+
+    @cached_property
+    def _logs(self) -> Array:
+        """Logarithms of the power of a surface at nodes (forms, spreads, exponents, bins).
+
+        Before the spreads stands the second one: the power is even in the spread.
+        """
+        spread = self.nodes[0] * np.sinh(self.nodes[1] * np.arange(self.tables.shape[1]))[:, None]
+        hurst = 1.0 / (1.0 + np.exp(-_LOGITS * np.ones_like(spread)))
+        # where a blur leaves nothing, a slope that no surface has
+        least = 1e-200 * np.exp(-40.0 * self.lnq)
+        logs = np.empty((len(self.tables), len(spread) + 1, _LOGITS.size, self.lnq.size))
+        for form, table in enumerate(self.tables):
+            weight = weights(hurst, self.t, form, self.axes, spread * np.ones_like(hurst))
+            logs[form, 1:] = np.log(weight @ table.transpose(0, 2, 1) + least)
+        logs[:, 0] = logs[:, 2]
+        return logs
+
+    def log_power(self, theta: Array, form: Array | int, *, slopes: bool = False) -> tuple[Array, Array]:
+        """Return the logarithm of the expected power of each bin, and its derivatives.
+
+        That of the surface is a cubic between the exponents and the spreads of a table.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (points, 6)
+            Exponent, spread of a blur, noise, corner (0: none), exponent of the long waves, sharpness p.
+        form : int or ndarray of int, shape (points,)
+        slopes : bool
+            Whether derivatives are wanted, else there are none.
+
+        Returns
+        -------
+        log_power : ndarray, shape (points, bins)
+        slopes : ndarray, shape (points, 6, bins)
+            By each of theta, by the logarithm of the corner.
+        """
+        from scipy.special import expit
+
+        logs, step = self._logs, _LOGITS[1] - _LOGITS[0]
+        _, spreads, exponents, bins = logs.shape
+        hurst, spread, noise, corner, long_hurst, sharpness = theta.T[:, :, None]
+        logit, place = np.log(theta[:, 0] / (1.0 - theta[:, 0])), np.arcsinh(theta[:, 1] / self.nodes[0])
+        place = 1.0 + place / self.nodes[1]
+        first_h, share_h, slope_h = _cubic((logit - _LOGITS[0]) / step, exponents)
+        first_s, share_s, slope_s = _cubic(np.minimum(place, spreads - 2.0), spreads)
+        rows = (form * spreads + first_s)[:, None] + np.arange(4)
+        nodes = rows[:, :, None] * exponents + (first_h[:, None] + np.arange(4))[:, None]
+        near = logs.reshape(-1, bins)[nodes.reshape(-1, 16)]
+        pairs = ((share_s, share_h), (share_s, slope_h), (slope_s, share_h))[: 3 if slopes else 1]
+        shares = [(s[:, :, None] * h[:, None]).reshape(-1, 16) for s, h in pairs]
+        values = np.stack(shares, axis=1) @ near
+        surface, is_bent = values[:, 0], theta[:, 3] > 0.0
+        p, difference = sharpness[is_bent], (long_hurst - hurst)[is_bent]
+        x = 2.0 * p * (np.log(corner[is_bent]) - self.lnq)
+        bend = np.logaddexp(0.0, x)
+        surface[is_bent] += difference / p * bend
+        power, white = np.exp(surface), np.square(noise) * self.white
+        total = power + white
+        found = np.zeros((theta.shape[0], 6 if slopes else 0, bins))
+        if slopes:
+            found[:, 0] = values[:, 1] / (hurst * (1.0 - hurst) * step)
+            found[:, 1] = values[:, 2] / (self.nodes[1] * np.hypot(spread, self.nodes[0]))
+            found[place >= spreads - 2.0, 1] = 0.0
+            found[is_bent, 0] -= bend / p
+            found[is_bent, 3] = 2.0 * difference * expit(x)
+            found[is_bent, 4] = bend / p
+            found[is_bent, 5] = difference / p**2 * (x * expit(x) - bend)
+            found *= (power / total)[:, None]
+            found[:, 2] = 2.0 * noise * self.white / total
+        return np.log(total), found
+
+
+def _cubic(place: Array, size: int) -> tuple[Array, Array, Array]:
+    """Return the first of four nodes about each place, and the shares of their values and slopes there."""
+    first = np.clip(place.astype(np.int64) - 1, 0, size - 4)
+    powers = (place - first - 1.0)[:, None] ** np.arange(4)
+    return first, powers @ _CUBICS, (powers[:, :3] * np.arange(1.0, 4.0)) @ _CUBICS[1:]
 
 
 def spread_nodes(longest: float, step: float) -> tuple[Array, Array]:

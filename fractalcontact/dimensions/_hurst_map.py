@@ -49,7 +49,6 @@ from fractalcontact.dimensions._spectral_posterior import (
     NOISE,
     SPREAD,
     Posterior,
-    bin_power,
     mixture_quantile,
     posterior,
 )
@@ -429,16 +428,14 @@ def _about_mean(
 
     m, k = np.unravel_index(component, found.share.shape)
     form, theta, discrepancy = found.hypotheses[m].form, found.theta[m, k].copy(), found.discrepancies[k]
-    problem = form, bins.axes, bins.tables[form], bins.nodes, bins.t, bins.white, bins.lnq
-    model, logs = np.empty(bins.level.size), np.empty((_EXPONENTS.size, bins.level.size))
-    bin_power(theta, *problem, model)
+    model = bins.log_power(theta[None], form)[0][0]
     weight = weight * discrepancy.inside
     amplitude = float(weight[0] @ (bins.level - model) / weight[0].sum())
     noise = math.exp(amplitude) * theta[NOISE] ** 2 * bins.white
     theta[NOISE] = 0.0
-    for row, u in zip(logs, _EXPONENTS, strict=True):
-        theta[HURST] = LOWEST + (HIGHEST - LOWEST) * float(ndtr(u))
-        bin_power(theta, *problem, row)
+    of_exponents = np.tile(theta, (_EXPONENTS.size, 1))
+    of_exponents[:, HURST] = LOWEST + (HIGHEST - LOWEST) * ndtr(_EXPONENTS)
+    logs = bins.log_power(of_exponents, form)[0]
     # the mean differs from the model alike in all windows
     target = np.vstack([model + amplitude, level - bins.level + model + amplitude])
     u, a = np.full(len(target), found.centre[m, k]), np.full(len(target), amplitude)

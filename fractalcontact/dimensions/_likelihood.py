@@ -46,7 +46,6 @@ from fractalcontact.dimensions._spectral_posterior import (
     NOISE,
     SPREAD,
     Posterior,
-    bin_power,
     posterior,
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
@@ -327,10 +326,7 @@ def _findings(found: Posterior, bins: Bins, dx: float, spread: float, height: fl
 def _residuals(bins: Bins, found: Posterior) -> Array:
     """Return logarithms of the power over the model of the most probable hypothesis."""
     hypothesis, _, theta = found.most_probable
-    model = np.empty(bins.level.size)
-    table = bins.tables[hypothesis.form]
-    bin_power(theta, hypothesis.form, bins.axes, table, bins.nodes, bins.t, bins.white, bins.lnq, model)
-    return bins.level - model
+    return np.asarray(bins.level - bins.log_power(theta[None], hypothesis.form)[0][0])
 
 
 def _amplitude(bins: Bins, found: Posterior) -> float:

@@ -22,7 +22,6 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
 from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, spread_nodes, weights
-from fractalcontact.dimensions._spectral_posterior import tail
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -43,8 +42,7 @@ _OCTAVE = math.log(2.0)
 
 def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = True) -> Array:
     """Return the expected power of each mode, or that part of it that is not due to the edges."""
-    weight = weights(theta[0], lattice.t)
-    weight[-1] *= tail(theta[0], lattice.t[-1], theta[1], form, lattice.axes)
+    weight = weights(theta[0], lattice.t, form, lattice.axes, theta[1])
     rows, columns = lattice.transforms(float(theta[1]), edges=edges)[form]
     power = (rows * weight[:, None]).T @ columns
     np.maximum(power, 1e-300, out=power)
