@@ -1,15 +1,10 @@
 """Surfaces and cracks shared by the tests of joints. Metres, heights up; E is +x and N is +y."""
 
-from dataclasses import replace
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.joints import _flow_network as network
-from fractalcontact.joints import _network_pressure
 
 
 @pytest.fixture(scope="session")
@@ -64,30 +59,3 @@ def teeth(make_face):
     face = make_face(np.broadcast_to(tooth, (6, 200)), spacing)
     crack = fc.joints.Crack(face, block=(6e-3, 0.1), young=3e10, poisson=0.2, basic_friction_angle=30)
     return fc.joints.dilatancy(crack, shear=np.arange(9) * spacing, direction=("E", "W"))
-
-
-@pytest.fixture(scope="session")
-def network_flow():
-    """Pressure in the cells of a gap, 1 at its low end of x and 0 at the other, its error, and the flow.
-
-    The options are those of the solver, which takes multigrid for many cells and elimination for others.
-    """
-
-    def solve(gap, *, periodic=False, **options):
-        cells = (network.conducting(gap) / gap.max()) ** 3
-        links = network.link_network(cells, 1.0, (periodic, periodic))
-        held = network.nothing_held(cells.shape)
-        if periodic:
-            links = replace(links, jump=(links.closes & (links.axis == 1)).astype(float))
-            wet = network.winding_cells(links)
-        else:
-            for place, level in ((0, 1.0), (-1, 0.0)):
-                end = network.edge_conductance(cells, 1.0, 1, place)
-                held.add(network.line_of(1, place), end, level)
-            wet = network.held_cells(links, held)
-        order = _network_pressure.nested_dissection(cells.shape, (periodic, periodic))
-        pressure, error = _network_pressure.pressures(links, wet, order, held, **options)
-        flow = network.dissipation(links, pressure, wet, held)
-        return SimpleNamespace(pressure=pressure, error=error, flow=flow)
-
-    return solve

@@ -103,17 +103,6 @@ def test_hole_beyond_the_precision_is_refused_with_the_reason(make_face):
         assert water.mean_uplift.sel(diagram="linear") == UPSTREAM / 2
 
 
-@pytest.mark.parametrize("seed", [0, 6])
-def test_multigrid_finds_the_pressure_behind_narrow_openings(network_flow, seed):
-    """In the second gap no path crosses: the pressure is that of one side or the other."""
-    pytest.importorskip("pyamg")
-    face = fc.surfaces.fbm((192, 192), 1e-4, hurst=0.8, rms_increment=1e-5, rng=seed)
-    gap = (face - float(face.quantile(0.2))).clip(0).values
-    eliminated, iterated = network_flow(gap), network_flow(gap, largest_direct=10)
-    np.testing.assert_allclose(iterated.pressure, eliminated.pressure, atol=2e-6)
-    np.testing.assert_allclose(iterated.pressure.mean(), eliminated.pressure.mean(), atol=1e-6)
-
-
 @pytest.mark.parametrize("stretch", [0.5, 1.0, 2.0])
 def test_radius_of_a_drain_of_one_cell(make_face, stretch):
     """A row of drains across a wide strip between two edges of one head, against wells (Muskat 1937)."""

@@ -5,7 +5,6 @@ import multiprocessing
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -130,28 +129,31 @@ def test_invalid_number_of_workers_is_refused(uninterrupted, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-def test_command_with_worker_processes_writes_the_same_bytes(uninterrupted, tmp_path):
-    done = copied_command("run", uninterrupted[0], "-o", tmp_path, "--workers", 2, "--quiet")
-    assert (done.returncode, done.stderr) == (0, "")
-    assert contents(tmp_path / "result.nc") == uninterrupted[1]
-
-
-def test_workers_have_one_thread_of_linear_algebra():
-    """NumPy reads its number of threads when it is imported, so it must be set before."""
-    code = """
+WATCH = """
 import os, sys
+from pathlib import Path
 class Watch:
     def find_spec(self, name, path, target=None):
         if name == "numpy":
-            print(os.environ.get("OPENBLAS_NUM_THREADS"), os.environ.get("MKL_NUM_THREADS"))
-            raise SystemExit
+            with Path(__file__).with_name("seen").open("a") as file:
+                print(os.environ.get("OPENBLAS_NUM_THREADS"), os.environ.get("MKL_NUM_THREADS"), file=file)
 sys.meta_path.insert(0, Watch())
-import fractalcontact.scenes._worker
 """
-    names = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    environment = {name: value for name, value in os.environ.items() if name not in names}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
-    assert done.stdout.split() == ["1", "1"], done.stderr
+
+
+def test_command_with_worker_processes_writes_the_same_bytes(uninterrupted, tmp_path, monkeypatch):
+    """The workers have one thread of linear algebra, which NumPy reads when it is imported."""
+    watch = tmp_path / "watch"
+    watch.mkdir()
+    (watch / "sitecustomize.py").write_text(WATCH, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(watch), os.environ.get("PYTHONPATH", "")]))
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    done = copied_command("run", uninterrupted[0], "-o", tmp_path / "out", "--workers", 2, "--quiet")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert contents(tmp_path / "out" / "result.nc") == uninterrupted[1]
+    # the last one is the process that the workers copy
+    assert (watch / "seen").read_text().splitlines()[-1] == "1 1"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
