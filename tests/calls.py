@@ -236,10 +236,6 @@ CALLS = {
     "plotting.dimension_curves": lambda: {"curves": curve(), "estimates": estimates()},
     "plotting.scans": lambda: {"overview": overview()},
     "plotting.correlation": lambda: {"memory": result_of("joints.decorrelation_length")},
-    "plotting.datasheet": lambda: {
-        "tree": xr.DataTree.from_dict({"/joints/closure_laws": laws()}), "notes": ["a note"],
-        "numbers": ["a number"],
-    },
     "plotting.error_against_time": lambda: {"measured": measured()},
     "plotting.estimator_errors": lambda: {"bench": estimators()},
     "plotting.slip_loops": lambda: {"result": result_of("joints.partial_slip")},

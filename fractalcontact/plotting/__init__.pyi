@@ -9,7 +9,6 @@ from ._contact_curves import path as path
 from ._contact_curves import pressure_distribution as pressure_distribution
 from ._contact_curves import slip_loops as slip_loops
 from ._curves import curves as curves
-from ._datasheet import datasheet as datasheet
 from ._dimensions import dimension_curves as dimension_curves
 from ._dimensions import dimensions as dimensions
 from ._dimensions import directional_roughness as directional_roughness
@@ -43,7 +42,6 @@ __all__ = [
     "contact_domains",
     "correlation",
     "curves",
-    "datasheet",
     "delta_dimension",
     "dimension_curves",
     "dimensions",

@@ -153,11 +153,8 @@ OPTIONS: dict[str, tuple[str, Test]] = {
         "a word or degrees anticlockwise from E",
         lambda value: isinstance(value, str) or _is_number(value),
     ),
-    "figure": ("a Figure or SubFigure, or None", _is_sheet),
     "marked": ("a sequence of numbers", _are_numbers),
-    **dict.fromkeys(("notes", "numbers"), ("a sequence of words", _are_words)),
     "panels": ("an integer >= 1", _is_count),
-    "tree": ("a DataTree", lambda value: isinstance(value, xr.DataTree)),
     "units": UNITS_EXPECTED,
     "variable": (
         "the name of a variable, or several",

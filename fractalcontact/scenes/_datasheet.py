@@ -9,7 +9,7 @@ import xarray as xr
 
 from fractalcontact.base.study import group_of, of_member
 from fractalcontact.base.tables import table
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._caveats import caveats
 from fractalcontact.scenes._result_tables import ResultTable, table_of
 from fractalcontact.scenes._stages import STAGES
@@ -34,8 +34,9 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
     Parameters
     ----------
     tree : DataTree
-        From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups of joints that
-        `fractalcontact.plotting.datasheet` names. Panels without data stay empty.
+        From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups
+        joints/roughness_coefficient, directional_roughness, strength_envelope, direct_shear, shear_curve,
+        closure, closure_laws, transmissivity and uplift. Panels without data stay empty.
     figure : Figure, optional
         An empty figure of matplotlib, which becomes the page: A4, upright. Default: a new figure.
 
@@ -60,19 +61,23 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
     >>> list(fc.scenes.datasheet(xr.DataTree.from_dict({"/joints/strength_envelope": envelope})))
     ['strength', 'normal stiffness', 'mean gap', 'transmissivity']
     """
+    from fractalcontact.plotting.joint_page import GROUPS, draw_page  # only where figures are wanted
+
     with Problems("fractalcontact.scenes.datasheet") as problems:
         problems.tree("tree", tree)
         is_sheet = figure is None or hasattr(figure, "subfigures")
         problems.require(is_sheet, "figure", "a Figure or SubFigure, or None", figure)
-    from fractalcontact import plotting  # only where figures are wanted
+        if isinstance(tree, xr.DataTree):
+            is_of_joint = any(group_of(tree, f"joints/{name}") is not None for name in GROUPS)
+            problems.require(is_of_joint, "tree", f"at least one of joints/{', joints/'.join(GROUPS)}", NONE)
 
     study = of_member(tree, 0)
     shown = list(_tables(study))
     # the page has room for so many characters beside the strength
-    texts = [f"{each.title}\n{table(written_rows(each), 60, rule=False)}" for each in shown if each.heads]
+    texts = [f"{each.title}\n{table(written_rows(each), 74, rule=False)}" for each in shown if each.heads]
     remarks = [remark for each in shown for remark in each.remarks]
     lines = "\n\n".join(texts).splitlines()
-    return plotting.datasheet(study, numbers=lines, notes=[*caveats(study), *remarks], figure=figure)
+    return draw_page(study, lines, [*caveats(study), *remarks], figure)
 
 
 def _tables(study: xr.DataTree, most: int = 4) -> Iterator[ResultTable]:

@@ -17,7 +17,7 @@ from plotting_figures import figure_of
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
 
-FIGURES = [name for name in plotting.__all__ if name not in ("draw", "datasheet", "curves")]
+FIGURES = [name for name in plotting.__all__ if name not in ("draw", "curves")]
 
 
 def draw(name, **options):

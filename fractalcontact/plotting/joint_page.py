@@ -1,4 +1,7 @@
-"""One page that describes a joint: roughness, strength, stiffness, aperture, flow and limits of validity."""
+"""One page that describes a joint: numbers, strength, stiffness, aperture, flow and limits of validity.
+
+`scenes.datasheet` draws it with rows of its tables, so the module is public inside the package.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,7 @@ import xarray as xr
 
 from fractalcontact.base.study import group_of, provenance_of
 from fractalcontact.base.units import PER_LENGTH, Scale, quantity_text
-from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._figure import figure as checked
 from fractalcontact.plotting._inputs import quantity, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, by_shear
@@ -39,70 +40,25 @@ GROUPS = (
 )  # fmt: skip
 
 
-@checked
-def datasheet(
-    tree: xr.DataTree,
-    *,
-    numbers: Sequence[str] = (),
-    notes: Sequence[str] = (),
-    figure: Figure | None = None,
+def draw_page(
+    tree: xr.DataTree, numbers: Sequence[str], notes: Sequence[str], figure: Figure | None
 ) -> dict[str, Axes]:
-    """Draw one page about a joint: strength, stiffness, aperture and flow against normal stress.
+    """Draw the page of a study, with numbers beside the strength and notes at its end; return its panels.
 
-    `fractalcontact.scenes.datasheet` draws it with the numbers and the limits of a study.
-
-    Parameters
-    ----------
-    tree : DataTree
-        From `fractalcontact.scenes.run` or `fractalcontact.open`, with any of the groups
-        joints/roughness_coefficient, directional_roughness, strength_envelope, direct_shear, shear_curve,
-        closure, closure_laws, transmissivity and uplift. Panels without data stay empty.
-    numbers : sequence of str
-        Lines to print beside the strength.
-    notes : sequence of str
-        Sentences to print with the limits of validity that the results state themselves.
-    figure : Figure, optional
-        An empty figure, which becomes the page: A4, upright. Default: a new figure.
-
-    Returns
-    -------
-    dict of str to Axes
-        The panels by what they show.
-
-    Raises
-    ------
-    InvalidInput
-        The study has none of these groups.
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> import xarray as xr
-    >>> surface = fc.surfaces.fbm((64, 64), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
-    >>> roughness = fc.joints.roughness_coefficient(surface)
-    >>> envelope = fc.joints.strength_envelope(
-    ...     surface, nominal_pressure=[1e6, 4e6], wall_strength=6e7, basic_friction_angle=30
-    ... )
-    >>> groups = {"/joints/roughness_coefficient": roughness, "/joints/strength_envelope": envelope}
-    >>> panels = fc.plotting.datasheet(xr.DataTree.from_dict(groups))
-    >>> [round(float(inches), 2) for inches in panels["strength"].figure.figure.get_size_inches()]
-    [8.27, 11.69]
+    It has strength, stiffness, aperture and flow against the normal stress, where the study has such groups.
     """
-    groups = {name: group_of(tree, f"joints/{name}") for name in GROUPS}
-    with Problems("fc.plotting") as problems:
-        expected = f"at least one of joints/{', joints/'.join(groups)}"
-        problems.require(any(data is not None for data in groups.values()), "tree", expected, NONE)
     import matplotlib.style
 
+    groups = {name: group_of(tree, f"joints/{name}") for name in GROUPS}
     page = _style.new_figure(A4) if figure is None else figure
     with matplotlib.style.context(_style.STYLE):  # the text of the page fits at one size only
         page.set_size_inches(A4)
         page.set_layout_engine("constrained", w_pad=0.07, h_pad=0.07)
         page.set_facecolor("white")
-        return _draw_page(page, tree, groups, numbers, notes)
+        return _draw_rows(page, tree, groups, numbers, notes)
 
 
-def _draw_page(
+def _draw_rows(
     page: Figure,
     tree: xr.DataTree,
     groups: dict[str, xr.Dataset | None],
@@ -121,7 +77,7 @@ def _draw_page(
     facts = "\n".join([_source(tree), *_input_lines(groups)])
     parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
     left, right = parts[1].subfigures(1, 2, width_ratios=(1.3, 1.6))
-    size = min(6.4, 160 / max(len(numbers), 1))  # points: the row has room for 25 lines of 6.4
+    size = min(6.0, 150 / max(len(numbers), 1))  # points: the row has room for 25 lines of 6
     left.text(0.08, 0.96, "\n".join(numbers), size=size, family="monospace", va="top", linespacing=1.4)
     if groups["strength_envelope"] is not None:
         panels["strength"] = right.add_subplot()
