@@ -8,10 +8,11 @@ Every function takes a result of another subpackage, as computed or as read back
 A function with one panel returns its Axes, one with several an array of Axes; `ax=` or `axes=` draws into a
 figure that exists. A page about a joint is `fractalcontact.scenes.datasheet`. A new figure is one of pyplot:
 a notebook shows it once, at the end of the cell, and `plt.show()` in a window. Text, lines and background
-follow the style of matplotlib that is in use; `plt.style.use("fractalcontact.plotting.report")` is that of the
-files that `draw` writes. Units are read from the data and shown with a suitable prefix (mm, µm, kN), or as `units={"normal_force": "kN"}` says; that of an
-axis is `ax.xaxis.get_units()`. `curves(ax).to_csv("closure.csv")` exports the numbers. `draw` writes every
-figure that a study has data for, without pyplot.
+follow the style of matplotlib that is in use; `plt.style.use("fractalcontact.plotting.report")` is that of
+the files that `draw` writes. Units are read from the data and shown with a suitable prefix (mm, µm, kN), or
+as `units={"normal_force": "kN"}` says; that of an axis is `ax.xaxis.get_units()`.
+`curves(ax).to_csv("closure.csv")` exports the numbers. `draw` writes every figure that a study has data for,
+without pyplot.
 """
 
 import lazy_loader
