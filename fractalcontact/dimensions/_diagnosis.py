@@ -17,12 +17,15 @@ from fractalcontact.dimensions._surface_input import Surface
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def diagnose(surface: Surface) -> str:
-    """Return why no interval holds for a surface, and what to do; empty where nothing was found."""
+def diagnose(surface: Surface, *, is_window: bool = False) -> str:
+    """Return why no interval holds for a surface, and what to do; empty where nothing was found.
+
+    `is_window`: `scales` leave out the waves that interpolated or repeated points have made.
+    """
     if surface.finest_scale:
         return ""
     return (
-        resampling(surface)
+        ("" if is_window else resampling(surface))
         or _seams(surface.heights, rounding_step(surface))
         or _spikes(surface.heights)
         or _missing_extremes(surface.heights)

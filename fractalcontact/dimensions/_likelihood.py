@@ -294,7 +294,7 @@ def _estimate(
         note=joined(*_findings(found, bins, dx, spread, height)),
         posterior=found,
     )
-    reason = diagnose(surface)
+    reason = diagnose(surface, is_window=window is not None)
     if any(surface.grid.periodic) and not fit.lattice.periodic:
         reason = _PERIODIC_GAPS
     if not reason and high - low > WIDEST:

@@ -203,6 +203,17 @@ def test_defects_have_a_reason_and_no_interval(defect):
     assert words in str(result.reason.values)
 
 
+@pytest.mark.parametrize("defect", ["enlarged", "interpolated"])
+def test_scales_that_leave_out_made_points_give_an_interval(defect):
+    """`reason` advises wavelengths from eight distances of the points that were measured on."""
+    change, _ = DEFECTS[defect]
+    distance = 2.0 if defect == "enlarged" else 0.2**-0.5  # spacings
+    window = (8.0 * distance * SPACING, 200.0 * SPACING)
+    results = [estimated(change(brownian(0.6, seed)), scales=window) for seed in range(8)]
+    assert sum(float(result.ci_low) < 0.6 < float(result.ci_high) for result in results) >= 7
+    assert all(str(result.reason.values) == "" for result in results)
+
+
 def test_plateau_of_16_waves(measured):
     heights = np.load(measured / "plateau_16_waves_256.npy") * 1e-6
     result = fc.dimensions.estimate(fc.surfaces.from_array(heights, SPACING)).isel(method=0)
