@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import contact, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import (
+from fractalcontact.accuracy._benchmarks import (
     EXACT,
     TOLERANCE,
     TOLERANCES,

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import dimensions, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import HURST, Array, Benchmark, Method
+from fractalcontact.accuracy._benchmarks import HURST, Array, Benchmark, Method
 
 Problem = tuple[xr.DataArray, dict[str, Any]]  # an ensemble of surfaces, options of the estimator
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import domains, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import Array, Benchmark, Method, largest_error
+from fractalcontact.accuracy._benchmarks import Array, Benchmark, Method, largest_error
 
 SIZES = (64, 128, 256, 512, 1024)
 HURST, COVERAGE, BOX = 0.5, 0.1, 4

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import joints, surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import (
+from fractalcontact.accuracy._benchmarks import (
     EXACT,
     TOLERANCE,
     TOLERANCES,

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact import surfaces
-from fractalcontact.accuracy._benchmarks._benchmark import HURST, Array, Benchmark, Method
+from fractalcontact.accuracy._benchmarks import HURST, Array, Benchmark, Method
 
 Generator = Callable[..., xr.DataArray]
 
