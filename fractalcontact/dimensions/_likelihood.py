@@ -253,7 +253,8 @@ def _rms_increment(heights: Array) -> float:
     for axis in (1, 0):
         steps = np.diff(heights, axis=axis).ravel()
         steps = steps if np.isfinite(steps.sum()) else steps[np.isfinite(steps)]
-        square = float(steps @ steps)
+        # not `steps @ steps`, whose last digits depend on the threads of BLAS
+        square = float(np.einsum("i,i->", steps, steps))
         if square > 0.0:
             return math.sqrt(square / steps.size)
     return 1.0
