@@ -23,6 +23,7 @@ from fractalcontact.plotting._style import Axes, AxesArray, Figure
 from fractalcontact.plotting._units import Quantity
 
 A4 = (8.27, 11.69)  # inches
+MOST_LIMITS = 22  # lines: a quarter of the page
 FLOW = Scale(1.0, "m³")  # transmissivities span decades: no prefix suits them all
 # what a consultant has to answer for, with its symbol and its unit
 INPUTS = {
@@ -69,16 +70,16 @@ def _draw_rows(
     panels: dict[str, Axes] = {}
     tests, curve = groups["direct_shear"], groups["shear_curve"]
     is_sheared = tests is not None or curve is not None
-    # title, strength, shear test (no room without one), stiffness and flow, limits
-    ratios = (0.95, 3.0, 2.7 if is_sheared else 0.05, 2.5, 2.05)
+    limits = list(_limits(groups, notes))[:MOST_LIMITS]
+    # title, strength, shear test (no room without one), stiffness and flow, limits; of a line of 6 points .14
+    ratios = (0.95, max(3.0, 0.14 * len(numbers)), 2.7 if is_sheared else 0.05, 2.5, 0.4 + 0.14 * len(limits))
     parts: Any = page.subfigures(len(ratios), 1, height_ratios=ratios)
     title = str(tree.attrs.get("title") or tree.name or "joint")
     parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
     facts = "\n".join([_source(tree), *_input_lines(groups)])
     parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
     left, right = parts[1].subfigures(1, 2, width_ratios=(1.3, 1.6))
-    size = min(6.0, 150 / max(len(numbers), 1))  # points: the row has room for 25 lines of 6
-    left.text(0.08, 0.96, "\n".join(numbers), size=size, family="monospace", va="top", linespacing=1.4)
+    left.text(0.08, 0.96, "\n".join(numbers), size=6.0, family="monospace", va="top", linespacing=1.4)
     if groups["strength_envelope"] is not None:
         panels["strength"] = right.add_subplot()
         _style.style_axes(panels["strength"])
@@ -92,11 +93,9 @@ def _draw_rows(
         _flow_panels(parts[3], groups["closure"], groups["closure_laws"], groups["transmissivity"]),
         strict=True,
     )
-    lines = list(_limits(groups, notes))[:17]  # the row has room for 15 of 6.5 points
-    parts[4].text(0.03, 0.95, "Limits of validity", size=9, weight="bold", va="top")
-    parts[4].text(
-        0.03, 0.86, "\n".join(lines), size=min(6.5, 94 / max(len(lines), 1)), va="top", linespacing=1.35
-    )
+    text = "\n".join(["", "", *limits])
+    parts[4].text(0.03, 1.0, "Limits of validity", size=9, weight="bold", va="top")
+    parts[4].text(0.03, 1.0, text, size=6.0, va="top", linespacing=1.4)
     return panels
 
 
@@ -207,4 +206,4 @@ def _limits(groups: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Itera
             None
         )
     for text in texts:
-        yield from textwrap.wrap(f"- {text}", 165, subsequent_indent="  ")  # the page, in 6.5 points
+        yield from textwrap.wrap(f"- {text}", 178, subsequent_indent="  ")  # the page, in 6 points
