@@ -75,11 +75,13 @@ PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
 
 
 def scale_for(units: str, values: Any) -> Scale:
-    """Return the scale for values in `units`; prefixes only for the units in `PREFIXED`."""
+    """Return the scale for values in `units`: a prefix for those in `PREFIXED`, MPa/mm for a stiffness."""
     if units in ("", "1"):
         return Scale(1.0, "")
     if units == "degree":
         return Scale(1.0, "°")
+    if units == "Pa m-1":
+        return PER_LENGTH
     if not PREFIXED.match(units):
         return Scale(1.0, raise_exponents(units))
     power = int(units[-1]) if units[-1].isdigit() else 1

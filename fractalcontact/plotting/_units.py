@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.schema import QUANTITIES
-from fractalcontact.base.units import PER_LENGTH, Scale, named_scale, number, scale_for
+from fractalcontact.base.units import Scale, named_scale, number, scale_for
 from fractalcontact.base.validation import Problems
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -55,13 +55,8 @@ OWN_NAME = frozenset(
 )  # fmt: skip
 PLAIN = Scale(1.0, "")  # of a number without a unit
 PER_CENT = Scale(0.01, "%")  # of a share
-# the unit of practice, whatever the values
-USUAL = {
-    **dict.fromkeys(
-        ("contact_fraction", "corrected_contact_fraction", "open_fraction", "coverage"), PER_CENT
-    ),
-    **dict.fromkeys(("contact_stiffness", "stiffness", "interface_stiffness"), PER_LENGTH),
-}
+# shown in per cent
+SHARES = ("contact_fraction", "corrected_contact_fraction", "open_fraction", "coverage")
 
 
 def units_of(data: xr.DataArray) -> str:
@@ -117,8 +112,8 @@ def scale_of(data: xr.DataArray, values: Any = None) -> Scale:
     wanted = named_scale(units_of(data), str(data.attrs[WANTED])) if WANTED in data.attrs else None
     if wanted is not None:
         return wanted
-    if str(data.name) in USUAL:
-        return USUAL[str(data.name)]
+    if str(data.name) in SHARES:
+        return PER_CENT
     return scale_for(units_of(data), np.asarray(data.values if values is None else values))
 
 

@@ -172,7 +172,7 @@ def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:
     pressure = data["nominal_pressure"]
     for name in data["criterion"].values:
         row = data.sel(criterion=name)
-        in_range = row["in_range"].all(set(row["in_range"].dims) - set(pressure.dims))  # of every member
+        in_range = row["in_range"].any(set(row["in_range"].dims) - set(pressure.dims))  # of some member
         inside = finite(pressure.where(in_range))
         ends = (
             dict.fromkeys(quantity_text(end, "Pa") for end in (inside.min(), inside.max()))
