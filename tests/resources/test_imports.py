@@ -94,10 +94,10 @@ WANTED = {
 # number of kernels of each subpackage
 COMPILED = {
     "rigid": {},
-    "dimension": {"dimensions": 6},
+    "dimension": {"dimensions": 3},
     "pressed": {"contact": 8},
     "closure": {"contact": 10},
-    "paper": {"dimensions": 7, "domains": 3, "contact": 10},
+    "paper": {"dimensions": 4, "domains": 3, "contact": 10},
 }
 
 
