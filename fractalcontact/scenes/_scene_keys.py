@@ -51,8 +51,8 @@ LONGEST_RANGE = 1_000_000  # entries of a range, members of an ensemble: more ar
 # arguments in Pa, which may have their unit, and words for others
 PRESSURES = (
     "young", "hardness", "yield_pressure", "contact_modulus", "nominal_pressure", "seating_pressure",
-    "wall_strength", "tensile_strength", "upstream_pressure", "downstream_pressure", "drain_pressure",
-    "total_stress",
+    "wall_strength", "compressive_strength", "tensile_strength", "cohesion", "upstream_pressure",
+    "downstream_pressure", "drain_pressure", "total_stress",
 )  # fmt: skip
 SPELLINGS: dict[str, dict[str, str]] = {"direction": AZIMUTH_WORDS, "dimensions": {"psd": "spectrum"}}
 BOUNDS = {

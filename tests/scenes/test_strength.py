@@ -48,6 +48,18 @@ def scene(tmp_path):
     return write
 
 
+@pytest.mark.parametrize("key", ["cohesion", "wall_strength"])
+def test_strengths_may_have_their_unit(scene, key):
+    section = "[joint.strength_envelope]\nwall_strength = 1e8\ncohesion = 1e6"
+    value = "1 MPa" if key == "cohesion" else "100 MPa"
+    with_unit = re.sub(rf"(?m)^{key} = .*$", f'{key} = "{value}"', section)
+    arguments = [
+        fc.scenes.load(scene(SCENE.replace(section, text))).tables["joint"]["strength_envelope"]
+        for text in (section, with_unit)
+    ]
+    assert arguments[0] == arguments[1]
+
+
 def test_criteria_of_an_ensemble_state_their_assumptions_once(scene, tmp_path):
     text = SCENE.replace("rng = 3", "rng = 3\nmembers = 2").replace('"direct_shear", "shear_curve", ', "")
     tree = fc.scenes.run(scene(text.replace("figures = true", "")), out=tmp_path / "out", progress=False)
