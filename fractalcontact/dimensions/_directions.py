@@ -13,25 +13,20 @@ from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions import _spectral_sectors as sectors
-from fractalcontact.dimensions._anisotropy import (
-    LEAST_LAGS,
-    RIDGES,
-    SMOOTH,
-    Anisotropy,
-    directional_fit,
-    fit_anisotropy,
+from fractalcontact.dimensions._azimuths import IMPROBABLE, LARGEST_LOG_RATIO, AzimuthFit, fit_azimuths
+from fractalcontact.dimensions._diagnosis import diagnose, rounding_step
+from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
+from fractalcontact.dimensions._metric_spectrum import squared_length
+from fractalcontact.dimensions._records import (
+    CONSTANT,
+    NORMAL,
+    Estimate,
+    joined,
+    plane,
+    smooth,
+    undefined,
 )
-from fractalcontact.dimensions._diagnosis import diagnose
-from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, normal_interval, plane, undefined
-from fractalcontact.dimensions._second_differences import (
-    DIRECTIONS,
-    EqualLags,
-    LatticeDirection,
-    MiddlePairs,
-    SecondDifferences,
-    lattice_directions,
-)
+from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,
@@ -44,7 +39,8 @@ from fractalcontact.dimensions._waves import without_waves
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-SMALLEST = 16  # points along each axis
+SMALLEST, LARGEST = 16, 2048  # points along each axis: 5 s of processor time and .8 GB
+_DIRECTIONS = 8
 _BY_DIRECTION = ("hurst", "fitted_hurst", "standard_error", "ci_low", "ci_high", "rms_increment")
 _OF_SURFACE = (
     "isotropy_p_value",
@@ -55,13 +51,17 @@ _OF_SURFACE = (
     "anisotropy_p_value",
 )
 _NAMES = (*_BY_DIRECTION, *_OF_SURFACE, "topothesy", "run_time", "azimuth", "increment_lag")
-_IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
-_SHARE_COMPARED = 1 / 3  # of the surface, which a second difference may span in a test
-_ROUNDING = 1e-22  # of the largest mean square: the heights do not vary along that direction
-_BENT = 3.3  # standard deviations of the curvature of the power law: one exact surface in a thousand
+_AWAY_FROM_ISOTROPY = 2.447746830680816  # root of the 95 % quantile of chi square, two degrees of freedom
+_WHITE, _STANDARD_ERRORS = 0.05, 3.0  # exponent above which heights are correlated, also in standard errors
 _NO_VARIATION = "the heights do not vary along this direction"
+_LEAST_SHARE = 1e-4  # of a maximum of the posterior that counts
 _NO_MODEL = "the surface does not fit the model, anisotropic fractional Brownian: the scatter is unknown"
-_FEW_LAGS = "fewer than two lags of this direction fit into the surface, or into the scales asked for"
+_UNCORRELATED = "heights without correlation have no anisotropy ratio"
+_FILLED = "waves of the filled gaps are shorter than those of the surface, a smooth one: give a complete part"
+_RIDGES = (
+    "the anisotropy is stronger than any ratio that the fit can find: ridges continue along the azimuth, or "
+    "spikes stand out"
+)
 
 
 def _check(problems: Problems) -> None:
@@ -88,13 +88,12 @@ def directions(
     Parameters
     ----------
     surface : DataArray
-        Heights in m, dims (..., y, x), at least 16 points along each axis. NaN marks missing points.
+        Heights in m, dims (..., y, x), at least 16 points along each axis; of more than 2048 the middle
+        ones are measured. NaN marks missing points.
     direction : str, float, or a sequence of them, optional
-        Compass words, or degrees anticlockwise from E, modulo 180; on free edges the nearest lattice
-        directions are used. Default: eight over the half-circle.
+        Compass words, or degrees anticlockwise from E, modulo 180. Default: eight over the half-circle.
     scales : (low, high), optional
-        Lengths in m: lags on free edges, wavelengths on periodic ones and for the tests. Default: the
-        shortest lags that all directions have, or the band of the spectrum.
+        Wavelengths in m of the waves that are fitted, as they are. Default: all that one model describes.
 
     Returns
     -------
@@ -113,15 +112,15 @@ def directions(
 
     Notes
     -----
-    Free edges: second differences over equal lengths along lattice directions. Periodic: sectors of the
-    spectrum. Single waves are taken out first. Where one power law does not describe the lags or the
-    wavelengths, as with blur or noise, there is no interval and no anisotropy ratio: give longer `scales`.
+    The model is that of `estimate`: all directions have the same blur, noise and bend, which widen their
+    intervals. An exponent is that of the waves that run along a direction, weighted by the sixteenth power
+    of the cosine of their angle to it. Single waves are taken out first.
     Models and tests: page `theory_dimensions`; measured size, power, coverage: page `estimator_accuracy`.
 
     References
     ----------
-    Davies and Hall (1999), J. R. Stat. Soc. B 61; Chan and Wood (2000), Annals of Statistics 28; Richard
-    (2018), Journal of Mathematical Imaging and Vision 60.
+    Davies and Hall (1999), J. R. Stat. Soc. B 61; Sykulski, Olhede, Guillaumin, Lilly and Early (2019),
+    Biometrika 106; Richard (2018), Journal of Mathematical Imaging and Vision 60.
 
     Examples
     --------
@@ -135,21 +134,58 @@ def directions(
     ... )
     ratio 2.0 along 30 degrees
     """
+    middle = {dim: slice(max(0, n - LARGEST) // 2, (n + LARGEST) // 2) for dim, n in surface.sizes.items()}
+    surface = surface.isel({dim: middle[dim] for dim in surface.dims[-2:]})
     surfaces = read_surfaces(surface)
     window = surfaces[0].resolved(read_scales(scales))
-    chosen = None
+    azimuths = np.arange(_DIRECTIONS) * 180.0 / _DIRECTIONS
     if direction is not None:
-        chosen = np.unique([towards.azimuth % 180.0 for towards in read_directions(direction)])
-    is_periodic = all(surfaces[0].grid.periodic) and all(single.is_complete for single in surfaces)
-    if is_periodic:
-        azimuths = np.arange(DIRECTIONS) * 180.0 / DIRECTIONS if chosen is None else chosen
-        results = [_periodic_surface(single, azimuths, window) for single in surfaces]
-    else:
-        lattice = set(lattice_directions(chosen, surfaces[0].plane_spacing))
-        ordered = sorted(lattice, key=lambda direction: direction.azimuth)
-        azimuths = np.array([direction.azimuth for direction in ordered])
-        results = [_free_surface(single, ordered, window) for single in surfaces]
+        azimuths = np.unique([towards.azimuth % 180.0 for towards in read_directions(direction)])
+    results = [_of_surface(single, azimuths, window) for single in surfaces]
     return _with_reasons(_dataset(surface, surfaces[0], azimuths, results), results)
+
+
+@dataclass(frozen=True)
+class _Anisotropy:
+    """Tests of isotropy of a surface, and its anisotropy ratio; fields as in `directions`.
+
+    `reason`: why there is no ratio; empty if there is one.
+    """
+
+    isotropy_p_value: float
+    anisotropy_ratio: float
+    anisotropy_ratio_low: float
+    anisotropy_ratio_high: float
+    anisotropy_azimuth: float
+    anisotropy_p_value: float
+    reason: str = ""
+
+    @classmethod
+    def of(cls, fit: AzimuthFit) -> _Anisotropy:
+        """Convert the two components of the log ratio, with their covariance, to ratio and azimuth."""
+        uv, nan = fit.uv, np.nan
+        low, hurst, high = (fit.found.quantile(share) for share in (0.025, 0.5, 0.975))
+        error = (high - low) / (2.0 * NORMAL)
+        isotropy_p_value, anisotropy_p_value = fit.p_values
+        azimuth = float(np.degrees(0.5 * np.arctan2(uv[1], uv[0])) % 180.0)
+        size = float(np.hypot(*uv))
+        if np.isnan(isotropy_p_value):
+            return cls(nan, nan, nan, nan, nan, nan, _FILLED)
+        if size > 0.99 * LARGEST_LOG_RATIO:
+            return cls(isotropy_p_value, nan, nan, nan, azimuth, anisotropy_p_value, _RIDGES)
+        if not hurst > max(_WHITE, _STANDARD_ERRORS * error):
+            return cls(isotropy_p_value, nan, nan, nan, nan, nan, _UNCORRELATED)
+        unit = uv / max(size, 1e-300)
+        # the modes determine the log ratio times 1 + H
+        variance = float(unit @ fit.covariance @ unit) + (size * error / (1.0 + hurst)) ** 2
+        return cls(
+            isotropy_p_value,
+            anisotropy_ratio=float(np.exp(size)),
+            anisotropy_ratio_low=float(np.exp(max(size - _AWAY_FROM_ISOTROPY * variance**0.5, 0.0))),
+            anisotropy_ratio_high=float(np.exp(size + NORMAL * variance**0.5)),
+            anisotropy_azimuth=azimuth,
+            anisotropy_p_value=anisotropy_p_value,
+        )
 
 
 @dataclass(frozen=True)
@@ -157,12 +193,8 @@ class _Directional:
     """Estimates of one surface by direction, and its anisotropy, or the reason why there is none."""
 
     estimates: list[Estimate]
-    anisotropy: Anisotropy | None
+    anisotropy: _Anisotropy | None
     reason: str = ""
-
-    @classmethod
-    def of(cls, estimates: list[Estimate], anisotropy: Anisotropy) -> _Directional:
-        return cls(estimates, anisotropy.defined(), anisotropy.reason)
 
 
 def _dataset(
@@ -204,146 +236,67 @@ def _with_reasons(result: xr.Dataset, results: Sequence[_Directional]) -> xr.Dat
     return result
 
 
-def _free_surface(surface: Surface, directions: Sequence[LatticeDirection], scales: Scales) -> _Directional:
-    """Measure a surface with free edges by its second differences, without its single waves."""
+def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Directional:
+    """Measure a surface, without its single waves."""
     if surface.is_constant or surface.is_plane:
         record = (undefined(CONSTANT) if surface.is_constant else plane()).limited()
-        return _Directional([record] * len(directions), None, record.note)
+        return _Directional([record] * azimuths.size, None, record.note)
+    for dim, ridge in (("x", 0.0), ("y", 90.0)):
+        if not np.diff(surface.heights, axis=("y", "x").index(dim)).any():
+            return _of_ridges(surface, dim, ridge, azimuths, scales)
     surface, note = without_waves(surface)
-    result = _by_differences(surface, directions, scales)
-    return replace(result, estimates=[replace(r, note=joined(note, r.note)) for r in result.estimates])
+    dx = surface.spacing[1]
+    lengths = None if scales is None else (scales[0] / dx, scales[1] / dx)
+    fit = fit_azimuths(surface, rounding_step(surface), lengths)
+    if fit is None:
+        record = (smooth() if scales is None else undefined(NO_MODES)).limited()
+        return _Directional([record] * azimuths.size, None, record.note)
+    anisotropy = _Anisotropy.of(fit)
+    reason = diagnose(surface)
+    if anisotropy.reason == _FILLED:
+        reason = _FILLED
+    elif anisotropy.reason == _RIDGES or fit.p_values[1] < IMPROBABLE:
+        reason = _NO_MODEL
+    every, *each = fit.classes.along(fit.spectrum, azimuths)
+    records = [
+        _along(fit, a, along, every, surface.unit, reason) for a, along in zip(azimuths, each, strict=True)
+    ]
+    records = [replace(record, note=joined(note, record.note)).limited() for record in records]
+    return _Directional(records, anisotropy, anisotropy.reason)
 
 
-def _by_differences(surface: Surface, directions: Sequence[LatticeDirection], scales: Scales) -> _Directional:
-    """Measure a surface by its second differences."""
-    equal = EqualLags.of(surface, directions, scales)
-    differences, owner = SecondDifferences.at(surface, directions, [equal.multiples(d) for d in directions])
-    every = lattice_directions(None, surface.plane_spacing)
-    compared = _compared(surface, SecondDifferences.of(surface, every, scales)[0])
-    limit = _ROUNDING * max(differences.means.max(initial=0.0), compared.means.max(initial=0.0))
-    varied = compared.part(compared.means > limit)
-    has_constant_direction = bool((compared.means <= limit).any())
-    anisotropy, reason = None, ""
-    if len(varied.vectors) > LEAST_LAGS and np.linalg.matrix_rank(varied.vectors) == 2:
-        anisotropy = fit_anisotropy(varied, _middle_pairs(surface, varied))
-        is_bent = abs(anisotropy.curvature_z) > _BENT
-        by_lags = anisotropy.anisotropy_p_value
-        if surface.is_complete:
-            # where the power law bends, the waves decide: the lags of the lattice differ in length
-            anisotropy = _tested_by_waves(surface, anisotropy, scales, is_straight=not is_bent)
-        is_beyond_model = anisotropy.reason in (RIDGES, SMOOTH) or (not is_bent and by_lags < _IMPROBABLE)
-        if has_constant_direction:
-            anisotropy = replace(anisotropy, isotropy_p_value=0.0, anisotropy_p_value=0.0, reason=RIDGES)
-        if is_beyond_model or anisotropy.anisotropy_p_value < _IMPROBABLE:
-            reason = _NO_MODEL
-        elif is_bent:
-            reason = _bent_reason(anisotropy.curvature_z, "lag")
-            anisotropy = replace(anisotropy, reason=anisotropy.reason or reason)
-    reason = reason or diagnose(surface)
-    estimates = []
-    for index, direction in enumerate(directions):
-        part = differences.part(owner == index)
-        weights = equal.weights(part, direction)
-        if (part.means <= limit).any():
-            estimates.append(undefined(_NO_VARIATION))
-        elif len(weights) < 2:
-            estimates.append(undefined(_FEW_LAGS))
-        else:
-            estimates.append(_along(surface, part, weights, anisotropy, reason))
-    if anisotropy is None:
-        return _Directional(estimates, None, "too few lags fit into the surface to compare directions")
-    return _Directional.of(estimates, anisotropy)
+def _of_ridges(surface: Surface, dim: str, ridge: float, azimuths: Array, scales: Scales) -> _Directional:
+    """Measure a surface that varies across its ridges alone, as a profile."""
+    profile = surface.source.isel({dim: 0}, drop=True)
+    across = likelihood(read_surfaces(profile.rename(y="x") if dim == "x" else profile)[0], scales, None)
+    records = []
+    for azimuth in azimuths:
+        share = abs(np.sin(np.radians(azimuth - ridge)))
+        increment = across.rms_increment * share**across.hurst
+        along = replace(across, rms_increment=increment, posterior=None).limited()
+        records.append(along if share > 0.0 else undefined(_NO_VARIATION))
+    anisotropy = _Anisotropy(0.0, np.nan, np.nan, np.nan, ridge, 0.0, _RIDGES)
+    return _Directional(records, anisotropy, _RIDGES)
 
 
-def _bent_reason(z: float, what: str) -> str:
-    return (
-        f"the exponent changes with the {what} ({z:+.1f} standard deviations), as with blur or noise: "
-        "give longer `scales`, that one exponent describes"
-    )
+def _along(fit: AzimuthFit, azimuth: float, along: Array, every: Array, unit: float, reason: str) -> Estimate:
+    """Return the estimate of one direction, from those of `Classes.along`; no interval if `reason`."""
+    from scipy.special import ndtr
 
-
-def _compared(surface: Surface, differences: SecondDifferences) -> SecondDifferences:
-    """Return the lags whose second differences span at most a third of the surface, for the tests."""
-    inside = np.all(2 * np.abs(differences.vectors) < _SHARE_COMPARED * np.array(surface.shape), axis=1)
-    return differences.part(inside)
-
-
-def _middle_pairs(surface: Surface, differences: SecondDifferences) -> MiddlePairs:
-    return MiddlePairs.of(surface.heights, surface.is_complete, differences.vectors, differences.numbers)
-
-
-def _tested_by_waves(
-    surface: Surface, anisotropy: Anisotropy, scales: Scales, *, is_straight: bool
-) -> Anisotropy:
-    """Take the p values from the waves of a complete surface that is large enough: they need no family.
-
-    Where the power law of the lags is straight, the smaller of both p values counts, doubled: second
-    differences are more sensitive to narrow ridges.
-    """
-    low, high = (0.0, np.inf) if scales is None else scales
-    window = low / surface.spacing[1], high / surface.spacing[1]
-    waves = sectors.TaperedModes.of(surface.heights, surface.plane_spacing, window)
-
-    def combined(metric: Array, fitted: int, by_lags: float) -> float:
-        by_waves = waves.test(metric, anisotropy.hurst, fitted=fitted)
-        if not np.isfinite(by_waves):
-            return by_lags
-        return min(2.0 * min(by_waves, by_lags), 1.0) if is_straight else by_waves
-
-    return replace(
-        anisotropy,
-        isotropy_p_value=combined(np.eye(2), 0, anisotropy.isotropy_p_value),
-        anisotropy_p_value=combined(np.linalg.inv(anisotropy.metric), 2, anisotropy.anisotropy_p_value),
-    )
-
-
-def _along(
-    surface: Surface,
-    differences: SecondDifferences,
-    weights: Array,
-    anisotropy: Anisotropy | None,
-    reason: str,
-) -> Estimate:
-    """Return the estimate of one direction; `weights` interpolate its lags. No interval if `reason`."""
-    hurst, metric = (None, np.eye(2)) if anisotropy is None else (anisotropy.hurst, anisotropy.metric)
-    pairs = _middle_pairs(surface, differences)
-    exponent, error, second = directional_fit(differences, pairs, weights, hurst, metric)
-    # a second difference over one lag has 4 - 4^H times the mean square of a first one
-    first = second / (4.0 - 4.0**exponent) if exponent < 1.0 else np.nan
-    increment = float(np.sqrt(first)) * surface.unit
-    estimate = Estimate(exponent, error, *normal_interval(exponent, error), rms_increment=increment)
-    return (estimate.without_interval(reason) if reason else estimate).limited()
-
-
-def _periodic_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Directional:
-    """Measure a periodic surface by the waves that run along each direction."""
-    if surface.is_constant:
-        return _Directional([undefined(CONSTANT)] * azimuths.size, None, CONSTANT)
-    surface, note = without_waves(surface)
-    extent = max(surface.grid.extent)
-    low, high = (0.0, np.inf) if scales is None else (extent / scales[1], extent / scales[0])
-    modes = sectors.PlaneModes.of(surface.heights, surface.plane_spacing).between(low, high)
-    gaps = np.diff(azimuths, append=azimuths[:1] + 180.0)
-    half_width = min(sectors.WIDEST, 0.5 * float(gaps.min())) if azimuths.size > 1 else sectors.WIDEST
-    increments = sectors.directional_increments(surface.heights, surface.plane_spacing, azimuths)
-    every = modes.power_law()
-    reason = _bent_reason(every.curvature_z, "wavelength") if abs(every.curvature_z) > _BENT else ""
-    reason = reason or diagnose(surface)
-    estimates = []
-    for azimuth, increment in zip(azimuths, increments * surface.unit, strict=True):
-        law = modes.sector(float(azimuth), half_width).power_law()
-        if not np.isfinite(law.hurst):
-            estimates.append(undefined("too few waves run along this direction"))
-            continue
-        interval = normal_interval(law.hurst, law.error)
-        estimate = Estimate(law.hurst, law.error, *interval, rms_increment=float(increment), note=note)
-        estimates.append((estimate.without_interval(reason) if reason else estimate).limited())
-    if modes.weights.sum() < sectors.LEAST or not np.isfinite(every.hurst):
-        return _Directional(estimates, None, "too few waves in the band to compare directions")
-    anisotropy = sectors.fit_spectral_anisotropy(modes, every.hurst)
-    if np.linalg.matrix_rank(modes.wavevectors) < 2:  # ridges across the only direction of the waves
-        y, x = modes.wavevectors[0]
-        across = float(np.degrees(np.arctan2(x, -y)) % 180.0)
-        anisotropy = replace(anisotropy, isotropy_p_value=0.0, anisotropy_p_value=0.0, reason=RIDGES)
-        anisotropy = replace(anisotropy, anisotropy_azimuth=across)
-    return _Directional.of(estimates, anisotropy)
+    # of the posterior the scatter of the modes is replaced by that of the modes along the direction
+    found, span = fit.found, HIGHEST - LOWEST
+    is_probable = found.share > _LEAST_SHARE
+    share, u, scale = (values[is_probable] for values in (found.share, found.centre, found.scale))
+    slope = span * np.exp(-0.5 * u * u) / np.sqrt(2.0 * np.pi)
+    centre = LOWEST + span * ndtr(u) + along[1] - every[1]
+    deviation = np.sqrt(np.maximum(np.square(scale * slope) - every[2], 0.0) + along[2])
+    places = np.linspace((centre - 5.0 * deviation).min(), (centre + 5.0 * deviation).max(), 2001)
+    below = share @ ndtr((places - centre[:, None]) / deviation[:, None]) / share.sum()
+    low, hurst, high = np.interp((0.025, 0.5, 0.975), below, places).tolist()
+    angle = np.radians(azimuth)
+    lag = float(squared_length(fit.spectrum.metric, np.sin(angle), np.cos(angle)))
+    increment = fit.scale * float(np.sqrt(np.exp(along[0]) * lag**hurst))
+    estimate = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high, rms_increment=increment * unit)
+    if not reason and high - low > WIDEST:
+        reason = f"the heights do not determine the exponent: {low:.2f} to {high:.2f} is as likely"
+    return estimate.without_interval(reason) if reason else estimate

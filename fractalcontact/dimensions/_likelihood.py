@@ -161,7 +161,7 @@ def fitted_modes(surface: Surface, spread: float | None = None, corrections: int
     if min(heights.shape[-surface.axes :]) < 4:
         return None
     heights = heights - heights[observed].mean() if is_periodic else _without_plane(heights)
-    scale = _rms_increment(heights)
+    scale = rms_increment(heights)
     heights /= scale
     filled = fill(heights)
     theta, form, ratio_of_lags = _first_fit(filled, lattice, spread, is_complete)
@@ -248,7 +248,7 @@ def _without_rim(heights: Array) -> Array:
     return heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
 
 
-def _rms_increment(heights: Array) -> float:
+def rms_increment(heights: Array) -> float:
     """Return the rms increment over one spacing along x, or along y if there is none."""
     for axis in (1, 0):
         steps = np.diff(heights, axis=axis).ravel()

@@ -1,0 +1,493 @@
+"""Exponents and amplitudes of a surface by azimuth, its metric, and tests of isotropy.
+
+1. The Laplacian of the heights is stationary, with a nearly even spectrum. Its Fourier modes know the sign of
+   the azimuth, and their expected power is exact for any metric, blur, noise and taper: the autocovariance
+   times the autocorrelation of the taper, transformed (Sykulski et al. 2019, Biometrika 106, 251-266).
+   Periodic surfaces have the modes of their heights.
+2. The power over that expected is averaged in classes: rings, and sectors of azimuth. Fisher scoring of the
+   classes over the mean of their ring gives the metric; the posterior of the rings exponent and nuisances.
+3. The probability of each hypothesis is multiplied by that of the azimuths, with the metric of its own.
+4. The exponent along an azimuth is that of the posterior plus the difference of a fit to the classes,
+   weighted by their azimuth, from one to all of them. Blur, noise and bend are alike in all azimuths.
+5. Harmonics of the azimuth, in level and in slope, vanish except for chance (score test).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fractalcontact.base import fft
+from fractalcontact.base.spectra import half_wavenumbers
+from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, mixture, spread_nodes
+from fractalcontact.dimensions._likelihood import rms_increment
+from fractalcontact.dimensions._metric_spectrum import MetricSpectrum, gaussian_tables, metric_of
+from fractalcontact.dimensions._mode_bins import LEAST, LEAST_BINS, PER_OCTAVE, fill
+from fractalcontact.dimensions._spectral_posterior import (
+    HURST,
+    NOISE,
+    SPREAD,
+    Posterior,
+    posterior,
+)
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+LARGEST_LOG_RATIO = math.log(16.0)  # of the metric: lags in the tables grow with the square of the ratio
+SECTORS = 16  # of the half-circle
+_SHARPNESS = 16
+_SAMPLE = 4  # modes of a class in which a change of the expected power is followed
+_TAPERED = 0.05  # share of an edge over which the taper rises
+_LEAK = 0.25  # share of the edges in the power of a mode from which on neighbours are correlated
+_LEAST_TRANSFER = 1e-3  # of a blur: see `clear_modes`
+_EMPTY = 1e-14  # of the largest level: rounding
+_CUT_OFF = 1e-4  # power of a ring over that an octave before; a blur of a spacing has 4e-5
+_POSSIBLE = 1e-3  # probability of a hypothesis whose azimuths are looked at
+_ROUNDS = 12
+IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
+_EXPONENTS, _STEP = np.linspace(0.02, 0.98, 13, retstep=True)  # between which logarithms are linear to 1 %
+_SAME = 0.03  # change of the log ratio that needs no other expected power
+
+
+class PlaneModes:
+    """Fourier modes of a surface, of its Laplacian where its edges are free.
+
+    Parameters
+    ----------
+    shape : (ny, nx)
+        Of the heights.
+    dy : float
+        Spacing along y; that along x is one.
+    is_periodic : bool
+    """
+
+    def __init__(self, shape: tuple[int, int], dy: float, is_periodic: bool) -> None:
+        self.dy, self.is_periodic = dy, is_periodic
+        self.shape = shape if is_periodic else (shape[0] - 2, shape[1] - 2)
+        self.tapers = [np.ones(n) if is_periodic else _taper(n) for n in self.shape]
+        self.information = math.prod(np.mean(w**2) ** 2 / np.mean(w**4) for w in self.tapers)
+        self.y, self.x = self._wavenumbers(1)
+        # one of each pair of conjugates, without those of two spacings, of which some are real
+        self.half = (np.abs(self.y) * dy < np.pi - 1e-9) & (self.x < np.pi - 1e-9)
+        self.half[self.y[:, 0] <= 0.0, 0] = False
+
+    def _wavenumbers(self, factor: int) -> tuple[Array, Array]:
+        y, x = half_wavenumbers((factor * self.shape[0], factor * self.shape[1]), (self.dy, 1.0))
+        return y[:, None], x
+
+    def power(self, heights: Array) -> Array:
+        """Return the squared modes of complete heights."""
+        z = heights
+        if not self.is_periodic:
+            inner = z[1:-1, 1:-1]
+            down = (z[2:, 1:-1] + z[:-2, 1:-1] - 2.0 * inner) / self.dy**2
+            z = down + z[1:-1, 2:] + z[1:-1, :-2] - 2.0 * inner
+        modes = fft.rfft2(z * self.tapers[0][:, None] * self.tapers[1])
+        power = np.square(modes.real) + np.square(modes.imag)
+        return np.asarray(power / math.prod(w @ w for w in self.tapers))
+
+    def filtered(self, density: Array | float, y: Array, x: Array) -> Array:
+        """Return the density of what is transformed: of the heights, or of their Laplacian."""
+        if self.is_periodic:
+            return density * np.ones(np.broadcast(y, x).shape)
+        return density * np.square((2.0 - 2.0 * np.cos(y * self.dy)) / self.dy**2 + 2.0 - 2.0 * np.cos(x))
+
+    def expected(self, spectrum: MetricSpectrum) -> tuple[Array, Array, Array]:
+        """Return the expected power of each mode, the density, and that of the fractal without a blur."""
+        factor = 1 if self.is_periodic else 2
+        y, x = self._wavenumbers(factor)
+        density = self.filtered(spectrum.with_noise(y, x), y, x)
+        density[0, 0] = 0.0
+        expected, clean = np.maximum(density, 1e-300), density[::factor, ::factor]
+        if not self.is_periodic:
+            ny, nx = (2 * n for n in self.shape)
+            lags = fft.irfft2(density.astype(complex), (ny, nx))
+            for w, axis in zip(self.tapers, ((slice(None), None), (None, slice(None))), strict=True):
+                overlap = fft.irfft(np.square(np.abs(fft.rfft(np.pad(w, (0, w.size))))) + 0j, 2 * w.size)
+                lags *= (overlap / (w @ w))[axis]
+            expected = np.maximum(fft.rfft2(lags).real[::2, ::2], 1e-300)
+        if spectrum.theta[SPREAD] == 0.0:
+            return expected, clean, clean
+        sharp = spectrum.theta.copy()
+        sharp[SPREAD] = 0.0
+        unblurred = replace(spectrum, theta=sharp).at(self.y, self.x)
+        return expected, clean, self.filtered(unblurred, self.y, self.x)
+
+
+def _taper(n: int) -> Array:
+    """Return a taper that rises as a sine at both ends."""
+    number = round(_TAPERED * n)
+    taper = np.ones(n)
+    taper[:number] = np.sin(0.5 * np.pi * (np.arange(number) + 0.5) / max(number, 1))
+    return np.minimum(taper, taper[::-1])
+
+
+def _means(group: Array, values: Array, weight: Array) -> Array:
+    """Return the weighted means of the values of each group; 0 without a weight."""
+    return np.asarray(np.bincount(group, weight * values) / np.maximum(np.bincount(group, weight), 1e-300))
+
+
+def _rings(lnq: Array) -> Array:
+    """Return the ring of each mode."""
+    return np.asarray((lnq - lnq.min(initial=np.inf)) * (PER_OCTAVE / math.log(2.0)) + 1e-9).astype(int)
+
+
+def _shortest(modes: PlaneModes, power: Array) -> float:
+    """Return the shortest wavelength before a cut-off, beyond which there is only leakage; 0 without one."""
+    q = np.hypot(modes.y, modes.x)[modes.half]
+    ring = np.unique(_rings(np.log(q)), return_inverse=True)[1]
+    density = power[modes.half] / modes.filtered(1.0, modes.y, modes.x)[modes.half]
+    mean = np.bincount(ring, density) / np.bincount(ring)
+    falls = np.flatnonzero(mean[PER_OCTAVE:] < _CUT_OFF * mean[:-PER_OCTAVE])
+    return 2.0 * np.pi / float(q[ring < falls[0] + PER_OCTAVE - 1].max()) if falls.size else 0.0
+
+
+class Classes:
+    """Classes of modes: rings of a third of an octave by sectors of azimuth.
+
+    Parameters
+    ----------
+    modes : PlaneModes
+    power : ndarray
+        Of each mode.
+    spectrum : MetricSpectrum
+        By which the power is divided.
+    scales : (low, high), optional
+        Wavelengths that count, in x spacings.
+    """
+
+    def __init__(self, modes: PlaneModes, power: Array, spectrum: MetricSpectrum, scales: Scales) -> None:
+        self.modes, self.spectrum = modes, spectrum
+        expected, clean, unblurred = modes.expected(spectrum)
+        q = np.hypot(modes.y, modes.x)
+        keep = modes.half & (np.abs(expected - clean) <= _LEAK * clean)
+        keep &= clean > _LEAST_TRANSFER * unblurred
+        keep &= between(2.0 * np.pi / np.maximum(q, 1e-300), scales)
+        lnq = np.log(q[keep])
+        ring = _rings(lnq)
+        count, total, rings = np.bincount(ring), 0, 0
+        joined = np.zeros(count.size, dtype=int)
+        for k, number in enumerate(count):  # those of few modes with the next
+            joined[k] = rings
+            total += number
+            if total >= LEAST:
+                rings, total = rings + 1, 0
+        self.number_of_modes, self.keep, self.expected = lnq.size, keep, expected[keep]
+        self.rings = max(rings, 1)
+        ring = np.minimum(joined, self.rings - 1)[ring]
+        rows, columns = np.nonzero(keep)
+        y, x = modes.y[rows, 0], modes.x[columns]
+        sector = np.rint(np.arctan2(y, x) * (SECTORS / np.pi)).astype(int) % SECTORS
+        present, self.number = np.unique(ring * SECTORS + sector, return_inverse=True)
+        self.ring, self.sector = np.divmod(present, SECTORS)
+        self.count = np.bincount(self.number).astype(float)
+        self.information = np.full(present.shape, modes.information)
+        self.level = self.means(power)
+        self.lnq = np.bincount(self.number, lnq) / self.count
+        # some modes of each class, evenly by their wavenumber
+        order, ends = np.lexsort((lnq, self.number)), np.cumsum(self.count).astype(int)
+        size = np.minimum(self.count, _SAMPLE).astype(int)
+        self.first = np.cumsum(size) - size
+        within = (np.arange(size.sum()) - np.repeat(self.first, size) + 0.5) / np.repeat(size, size)
+        starts = np.repeat(ends - self.count, size)
+        place = order[(starts + within * np.repeat(self.count, size)).astype(int)]
+        self.size, self.sample = size, (y[place], x[place])
+
+    def means(self, power: Array) -> Array:
+        """Return the mean of a power over that expected, for each class."""
+        return np.asarray(np.bincount(self.number, power[self.keep] / self.expected) / self.count)
+
+    def corrected(self, before: Array, after: Array) -> None:
+        """Correct for gaps, by the levels of Gaussian surfaces before and after filling: (surfaces, classes).
+
+        The scatter of those after filling gives the information of each ring.
+        """
+        mean, freedom = after.mean(axis=0), len(after) / (len(after) - 1.0)
+        scatter = freedom * self.count * np.mean(np.square(after / mean - 1.0), axis=0)
+        self.level = self.level / (mean / before.mean(axis=0))
+        by_ring = np.maximum(1.0, self.by_ring(scatter, np.ones(mean.size)))
+        self.information = self.information / by_ring[self.ring]
+
+    @cached_property
+    def _before(self) -> Array:
+        return self.spectrum.with_noise(*self.sample)
+
+    def _of_sample(self, values: Array) -> Array:
+        return np.asarray(np.add.reduceat(values, self.first) / self.size)
+
+    def relative(self, spectrum: MetricSpectrum) -> Array:
+        """Return the power of a spectrum over that by which the power was divided."""
+        return self._of_sample(spectrum.with_noise(*self.sample) / self._before)
+
+    def by_ring(self, values: Array, weight: Array) -> Array:
+        """Return the weighted mean in each ring; 0 without a weight."""
+        return _means(self.ring, values, weight)
+
+    def excess(self, spectrum: MetricSpectrum) -> Array:
+        """Return the level over the mean of the ring, less one."""
+        ratio = self.level / np.maximum(self.relative(spectrum), 1e-300)
+        return np.asarray(ratio / self.by_ring(ratio, self.count)[self.ring] - 1.0)
+
+    def centred(self, columns: list[Array]) -> Array:
+        """Return columns less the mean of their ring, shape (classes, columns)."""
+        return np.stack([c - self.by_ring(c, self.count)[self.ring] for c in columns], axis=1)
+
+    def metric_columns(self, spectrum: MetricSpectrum, uv: Array, step: float = 1e-4) -> list[Array]:
+        """Return the derivatives of the logarithms with respect to the components of the log ratio."""
+        moved = [replace(spectrum, metric=metric_of(*(uv + move))) for move in np.eye(2) * step]
+        here, *there = (np.log(np.maximum(self.relative(each), 1e-300)) for each in (spectrum, *moved))
+        return [(each - here) / step for each in there]
+
+    def fit_metric(self, spectrum: MetricSpectrum, uv: Array) -> tuple[Array, Array, float]:
+        """Return the components of the log ratio, by Fisher scoring, their covariance, and the deviance.
+
+        The deviance is that of the classes from the mean of their ring.
+        """
+        weight = self.count * self.information
+        for _ in range(_ROUNDS):
+            spectrum = replace(spectrum, metric=metric_of(*uv))
+            columns = self.centred(self.metric_columns(spectrum, uv))
+            covariance = np.linalg.pinv((weight[:, None] * columns).T @ columns)
+            step = covariance @ (columns.T @ (weight * self.excess(spectrum)))
+            uv = uv + step / max(1.0, math.hypot(*step))
+            uv = uv / max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)
+            if math.hypot(*step) < 0.01:
+                break
+        excess = self.excess(replace(spectrum, metric=metric_of(*uv)))
+        deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
+        return uv, covariance, float(deviance)
+
+    @property
+    def _logs(self) -> tuple[Array, Array]:
+        """Logarithms of the levels, unbiased, and their variances."""
+        from scipy.special import digamma, polygamma
+
+        degrees = np.maximum(self.count * self.information, 1e-3)
+        floor = _EMPTY * float(self.level.max())
+        logs = np.log(np.maximum(self.level, floor)) + np.log(degrees) - digamma(degrees)
+        return logs, polygamma(1, degrees)
+
+    def levels(self) -> tuple[Array, Array, Array]:
+        """Return the mean logarithms of the rings, their variances, and the shares of the classes.
+
+        Where the exponent differs with the azimuth the mean of the logarithms has the mean exponent.
+        """
+        logs, variance = self._logs
+        share = 1.0 / variance
+        total = np.bincount(self.ring, share)
+        return self.by_ring(logs, share), 1.0 / total, share / total[self.ring]
+
+    def bins(self, spectrum: MetricSpectrum, *, is_pilot: bool) -> Bins:
+        """Return the bins of the posterior: the rings."""
+        modes = self.modes
+        extent = max(modes.shape[0] * modes.dy, float(modes.shape[1]))
+        t = mixture(-2 * math.ceil(math.log2(8.0 * extent)) - 2)
+        shortest = min(modes.shape[0] * modes.dy, modes.shape[1])
+        spreads, nodes = spread_nodes(max(1.0, shortest / 12.0), 0.25 if is_pilot else 0.1)
+        level, variance, share = self.levels()
+        weight = np.repeat(share / self.size, self.size) / self._before
+        starts = self.first[np.flatnonzero(np.diff(self.ring, prepend=-1))]
+
+        def mean(values: Array) -> Array:
+            return np.add.reduceat(values * weight, starts, axis=-1)
+
+        tables = gaussian_tables(t, spreads, spectrum.metric, self.sample, modes.dy, mean)
+        lnq = self.by_ring(self.lnq, self.count)
+        return Bins(level, variance, tables, nodes, t, mean(np.ones(weight.size)), lnq, extent, 2)
+
+    def along(self, spectrum: MetricSpectrum, azimuths: Array) -> Array:
+        """Fit amplitude and exponent to all waves, and to those about azimuths (degree).
+
+        Returns
+        -------
+        ndarray, shape (1 + azimuths, 3)
+            Logarithm of the amplitude, exponent, and its variance, multiplied by chi square per degree of
+            freedom where that is above one.
+        """
+        theta = spectrum.theta
+        spectra = [replace(spectrum, theta=np.r_[hurst, theta[1:]]) for hurst in _EXPONENTS]
+        powers = np.log([self._of_sample(each.at(*self.sample) / self._before) for each in spectra])
+        noise = self._of_sample(theta[NOISE] ** 2 / self._before)
+        logs, variance = self._logs
+        angles = np.pi / SECTORS * self.sector - np.radians(azimuths)[:, None]
+        found = []
+        for weight in (np.ones(logs.size), *np.abs(np.cos(angles)) ** _SHARPNESS):
+            share = weight / variance
+            a, hurst = 0.0, float(theta[HURST])
+            for _ in range(_ROUNDS):  # Gauss-Newton
+                k = min(max(int((hurst - _EXPONENTS[0]) / _STEP), 0), _EXPONENTS.size - 2)
+                slope = (powers[k + 1] - powers[k]) / _STEP
+                power = np.exp(a + powers[k] + (hurst - _EXPONENTS[k]) * slope)
+                part = power / (power + noise)
+                design = np.stack([part, part * slope], axis=1)
+                residual = logs - np.log(power + noise)
+                inverse = np.linalg.pinv((share[:, None] * design).T @ design)
+                step = np.clip(inverse @ (design.T @ (share * residual)), -0.5, 0.5)
+                a, hurst = a + float(step[0]), min(max(hurst + float(step[1]), -0.5), 1.5)
+                if np.abs(step).max() < 1e-6:
+                    break
+            scatter = inverse @ ((share * share * variance)[:, None] * design).T @ design @ inverse
+            square = float(share @ np.square(residual)) / weight.sum()
+            found.append((a, hurst, scatter[1, 1] * max(1.0, square)))
+        return np.array(found)
+
+    def test(self, spectrum: MetricSpectrum, uv: Array | None, shortest: float = 3.0) -> float:
+        """Return the p value of harmonics of the azimuth of waves longer than the `shortest`, in spacings.
+
+        The components `uv` of the log ratio were fitted; None: about an isotropic surface.
+        """
+        from scipy.special import chdtrc
+
+        fitted = 0 if uv is None else 2
+        spectrum = replace(spectrum, metric=metric_of(*(np.zeros(2) if uv is None else uv)))
+        lower = np.linalg.cholesky(np.linalg.inv(spectrum.metric))
+        azimuth = np.pi / SECTORS * self.sector
+        across = lower[0, 0] * np.sin(azimuth) + lower[1, 0] * np.cos(azimuth)
+        azimuth = np.arctan2(across, lower[1, 1] * np.cos(azimuth))
+        waves = [wave(order * azimuth) for order in (2, 4) for wave in (np.cos, np.sin)]
+        columns = [*waves, *(self.lnq * wave for wave in waves)]
+        if uv is not None:
+            columns[:2] = self.metric_columns(spectrum, uv)
+        length = 2.0 * np.pi / np.exp(self.by_ring(self.lnq, self.count)) / max(1.0, self.modes.dy)
+        weight = self.count * self.information * (length > shortest)[self.ring]
+        centred = self.centred(columns)
+        score = centred.T @ (weight * self.excess(spectrum))
+        covariance = (weight[:, None] * centred).T @ centred
+        if fitted:
+            projection = covariance[fitted:, :fitted] @ np.linalg.pinv(covariance[:fitted, :fitted])
+            score = score[fitted:] - projection @ score[:fitted]
+            covariance = covariance[fitted:, fitted:] - projection @ covariance[:fitted, fitted:]
+        return float(chdtrc(score.size, score @ np.linalg.pinv(covariance) @ score))
+
+
+@dataclass(frozen=True)
+class AzimuthFit:
+    """Classes of a surface, their most probable spectrum, its metric, and the posterior of the exponent.
+
+    Attributes
+    ----------
+    classes : Classes
+    spectrum : MetricSpectrum
+        Isotropic where no metric describes the surface.
+    uv : ndarray, shape (2,)
+        Components of the log ratio.
+    covariance : ndarray, shape (2, 2)
+        Of these.
+    found : Posterior
+    p_values : tuple of float
+        That an isotropic surface, and one of this metric, differs as much between azimuths; NaN where
+        the filling of gaps has made the short waves.
+    scale : float
+        Rms increment of the heights, in scaled heights.
+    """
+
+    classes: Classes
+    spectrum: MetricSpectrum
+    uv: Array
+    covariance: Array
+    found: Posterior
+    p_values: tuple[float, float]
+    scale: float
+
+
+def fit_azimuths(surface: Surface, step: float, scales: Scales) -> AzimuthFit | None:
+    """Fit the waves of a surface by azimuth; None if they are too few.
+
+    `step`: of rounded heights. `scales`: wavelengths in x spacings.
+    """
+    observed = np.isfinite(surface.heights)
+    is_complete = bool(observed.all())
+    scale = rms_increment(surface.heights)
+    background = math.hypot(step / math.sqrt(12.0), float(np.finfo(float).eps)) / scale
+    heights = fill((surface.heights - surface.heights[observed].mean()) / scale)
+    dy = surface.plane_spacing[0]
+    modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_complete and all(surface.grid.periodic))
+    power = modes.power(heights)
+    known = None if scales is None else 0.0
+    options: dict[str, Any] = {"background": background, "spread": known, "noise": known}
+    options["is_window"] = scales is not None
+    low, high = (0.0, np.inf) if scales is None else scales
+    band = max(low, _shortest(modes, power)), high
+
+    def classes_of(spectrum: MetricSpectrum) -> Classes | None:
+        classes = Classes(modes, power, spectrum, band)
+        if classes.number_of_modes < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
+            return None
+        if not is_complete:
+            classes.corrected(*_filled_levels(classes, observed))
+        return classes
+
+    def most_probable(
+        classes: Classes, spectrum: MetricSpectrum, uv: Array, is_pilot: bool
+    ) -> tuple[Posterior, MetricSpectrum, Array, Array]:
+        """Return the posterior, and the spectrum with its log ratio and covariance.
+
+        The probability of a hypothesis is multiplied by that of the azimuths, with a metric of its own.
+        """
+        spread = float(spectrum.theta[SPREAD]) if scales is None else 0.0
+        bins = classes.bins(spectrum, is_pilot=is_pilot)
+        found = posterior(bins, pilot_spread=spread, is_pilot=is_pilot, **options)
+        fits, share = [], np.zeros_like(found.share)
+        for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE):
+            theta = found.theta[m, int(np.argmax(found.share[m]))]
+            each = replace(spectrum, theta=theta, form=found.hypotheses[m].form)
+            fits.append((each, *classes.fit_metric(each, uv), m))
+        least = min(fit[3] for fit in fits)
+        for *_, deviance, m in fits:
+            share[m] = found.share[m] * math.exp(0.5 * (least - deviance))
+        found = replace(found, share=share / share.sum())
+        spectrum, uv, covariance, *_ = max(fits, key=lambda fit: float(found.share[fit[4]].sum()))
+        return found, replace(spectrum, metric=metric_of(*uv)), uv, covariance
+
+    uv = np.zeros(2)
+    spectrum = MetricSpectrum(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 1.0]), ALIASED, metric_of(*uv), dy)
+    for rounds in range(_ROUNDS):
+        some = classes_of(spectrum)
+        if some is None:
+            return None
+        classes, before = some, uv
+        if rounds > 0:
+            uv, covariance, _ = classes.fit_metric(spectrum, uv)
+            spectrum = replace(spectrum, metric=metric_of(*uv))
+            if math.hypot(*(uv - before)) > _SAME and rounds < _ROUNDS - 1:
+                continue
+        before = uv
+        found, spectrum, uv, covariance = most_probable(classes, spectrum, uv, rounds == 0)
+        change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
+        if rounds > 0 and math.hypot(*(uv - before)) < _SAME and np.ptp(change) < 0.7:
+            break
+    p_values = classes.test(spectrum, None), classes.test(spectrum, uv)
+    if not is_complete and not found.most_probable[1].inside.all():
+        # beyond a cut the waves are those of the filling, which know the axes
+        p_values = math.nan, math.nan
+    if p_values[1] < IMPROBABLE:  # each azimuth is compared with all of them
+        isotropic = metric_of(0.0, 0.0)
+        spectrum = replace(spectrum, metric=isotropic)
+        again = classes_of(spectrum)
+        if again is not None:
+            classes = again
+            found, spectrum, *_ = most_probable(classes, spectrum, np.zeros(2), False)
+            spectrum = replace(spectrum, metric=isotropic)
+    return AzimuthFit(classes, spectrum, uv, covariance, found, p_values, scale)
+
+
+def _filled_levels(classes: Classes, observed: Array) -> tuple[Array, Array]:
+    """Return the levels of Gaussian surfaces with the spectrum of the classes before and after filling."""
+    stream, modes = np.random.default_rng(1), classes.modes
+    ny, nx = observed.shape
+    y, x = half_wavenumbers((2 * ny, 2 * nx), (modes.dy, 1.0))
+    root = np.sqrt(classes.spectrum.with_noise(y[:, None], x))
+    root[0, 0] = 0.0
+    levels = []
+    for _ in range(2):
+        heights = fft.irfft2(fft.rfft2(stream.standard_normal((2 * ny, 2 * nx))) * root, (2 * ny, 2 * nx))
+        for part in (heights[:ny, :nx], heights[ny:, nx:], heights[:ny, nx:], heights[ny:, :nx]):
+            filled = fill(np.where(observed, part, np.nan))
+            levels.append([np.maximum(classes.means(modes.power(z)), 1e-300) for z in (part, filled)])
+    before, after = np.moveaxis(np.array(levels), 1, 0)
+    return before, after
