@@ -160,10 +160,9 @@ def warn_steep(what: str, slope: float) -> None:
 def warn_lay(what: str, error: float) -> None:
     """Warn of a contact with a lay that was solved by superposition, by the error of that."""
     if abs(error) > ACCEPTABLE_ERROR:
-        message = (
-            f"{what} has a lay, and by superposition displacement and dissipated energy are off by about"
-        )
-        message += f" {error:+.0%}: use method='full'"
+        message = f"{what} has a lay, and by superposition the displacement is off by about {error:+.0%}, the"
+        # at small forces, of three surfaces with a lay: 3.3, 4.6 and 5 times
+        message += " dissipated energy by three to five times that: use method='full'"
         warn(message, AnisotropyWarning)
 
 

@@ -408,9 +408,9 @@ def fit_azimuths(surface: Surface, step: float, scales: Scales) -> AzimuthFit | 
     dy = surface.plane_spacing[0]
     modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_complete and all(surface.grid.periodic))
     power = modes.power(heights)
-    known = None if scales is None else 0.0
-    options: dict[str, Any] = {"background": background, "spread": known, "noise": known}
-    options["is_window"] = scales is not None
+    options: dict[str, Any] = {"background": background, "is_window": scales is not None}
+    if scales is not None:
+        options |= {"spread": 0.0, "noise": False}
     low, high = (0.0, np.inf) if scales is None else scales
     band = max(low, _shortest(modes, power)), high
 

@@ -182,6 +182,9 @@ class Bins:
     extent : float
         Of the longer edge, in x spacings.
     axes : int
+    noise : float
+        Rms height of white noise, if it is known: the amplitude of the surface is then this over the noise
+        of theta, in place of free.
     """
 
     level: Array
@@ -193,6 +196,7 @@ class Bins:
     lnq: Array
     extent: float
     axes: int
+    noise: float = 0.0
 
     @cached_property
     def _logs(self) -> Array:
@@ -252,6 +256,7 @@ class Bins:
         surface[is_bent] += difference / p * bend
         power, white = np.exp(surface), np.square(noise) * self.white
         total = power + white
+        amplitude = 2.0 * np.log(self.noise / noise) if self.noise > 0.0 else 0.0
         found = np.zeros((theta.shape[0], 6 if slopes else 0, bins))
         if slopes:
             found[:, 0] = values[:, 1] / (hurst * (1.0 - hurst) * step)
@@ -263,7 +268,9 @@ class Bins:
             found[is_bent, 5] = difference / p**2 * (x * expit(x) - bend)
             found *= (power / total)[:, None]
             found[:, 2] = 2.0 * noise * self.white / total
-        return np.log(total), found
+            if self.noise > 0.0:
+                found[:, 2] -= 2.0 / noise
+        return np.log(total) + amplitude, found
 
 
 def _cubic(place: Array, size: int) -> tuple[Array, Array, Array]:

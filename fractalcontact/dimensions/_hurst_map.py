@@ -351,14 +351,13 @@ class _Model:
         window does not have in common with the one before. Those that together have the `probability` are
         used, at most `most` of them.
         """
-        absent = 0.0 if is_window else None
         mean, scatter = _mean_of_windows(level, variance, self.bins.lnq, max(new_share, 1.0 / len(level)))
         bins = replace(self.bins, level=mean, variance=scatter)
         spread = 0.0 if is_window else float(self.fit.theta[SPREAD])
         found = posterior(
             bins,
-            spread=absent,
-            noise=absent,
+            spread=0.0 if is_window else None,
+            noise=False if is_window else None,
             background=self.background,
             pilot_spread=spread,
             is_window=is_window,

@@ -135,14 +135,16 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     unit = fit.scale * surface.unit
     background = math.hypot(rounding_step(surface) / math.sqrt(12.0), float(np.finfo(float).eps)) / fit.scale
     bins = fit.bins(keep)
-    options: dict[str, Any] = {"spread": spread, "background": background, "is_window": window is not None}
-    options["pilot_spread"] = float(fit.theta[SPREAD]) if spread is None else 0.0
-    found = posterior(bins, **options)
-    # the model counts noise in increments of the fractal without its blur, whose amplitude is fitted: it
-    # changes by less than 1 % in a third round
-    for _ in range(0 if noise is None else 2):
-        relative = (noise or 0.0) / unit / math.sqrt(_amplitude(bins, found))
-        found = posterior(bins, noise=relative, **options)
+    known = 0.0 if not noise else math.hypot(noise / unit, background)
+    bins = replace(bins, noise=known)
+    found = posterior(
+        bins,
+        spread=spread,
+        noise=None if noise is None else noise > 0.0,
+        background=background,
+        is_window=window is not None,
+        pilot_spread=float(fit.theta[SPREAD]) if spread is None else 0.0,
+    )
     estimate = _estimate(surface, fit, bins, found, window, unit, noise, psf)
     return replace(estimate, note=joined(marks, estimate.note))
 
@@ -332,7 +334,10 @@ def _residuals(bins: Bins, found: Posterior) -> Array:
 
 def _amplitude(bins: Bins, found: Posterior) -> float:
     """Return the square of the rms increment of the fractal over one spacing, over that of the heights."""
-    inside = found.most_probable[1].inside
+    _, discrepancy, theta = found.most_probable
+    if bins.noise > 0.0:
+        return float(np.square(bins.noise / theta[NOISE]))
+    inside = discrepancy.inside
     residuals, weights = _residuals(bins, found)[inside], 1.0 / bins.variance[inside]
     return math.exp(float(weights @ residuals / weights.sum()))
 

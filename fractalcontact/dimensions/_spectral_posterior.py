@@ -199,15 +199,16 @@ def joint_quantiles(
     return [LOWEST + (HIGHEST - LOWEST) * float(ndtr(each)) for each in found]
 
 
-def hypotheses(spread: float | None, noise: float | None, background: float) -> list[Hypothesis]:
-    """Return the combinations of nuisances; known values of `spread` (spacings) and `noise` are not fitted.
+def hypotheses(spread: float | None, noise: bool | None, background: float) -> list[Hypothesis]:
+    """Return the combinations of nuisances; a known `spread` (spacings) is not fitted.
 
-    `background` is the noise that is known to be there, as of rounding, over the rms increment.
+    `noise`: whether there is white noise, if that is known. `background` is the noise that is known to be
+    there, as of rounding, over the rms increment.
     """
     nan = math.nan
     found = []
     for form, is_blurred, is_noisy, is_bent in itertools.product(FORMS, *[(False, True)] * 3):
-        if (is_blurred and spread is not None) or (is_noisy and noise is not None):
+        if (is_blurred and spread is not None) or (noise is not None and is_noisy != noise):
             continue
         prior = FORMS[form].prior_blurred if is_blurred or spread else FORMS[form].prior
         if prior == 0.0:
@@ -218,7 +219,7 @@ def hypotheses(spread: float | None, noise: float | None, background: float) -> 
             prior *= _NOISY if is_noisy else 1.0 - _NOISY
         prior *= _BENT if is_bent else 1.0 - _BENT
         blur = nan if is_blurred else spread or 0.0
-        white = nan if is_noisy else math.hypot(noise or 0.0, background)
+        white = nan if is_noisy else background
         bend = (nan, nan, nan) if is_bent else (0.0, 0.0, 1.0)
         found.append(Hypothesis(form, (nan, blur, white, *bend), math.log(prior)))
     return found
@@ -228,7 +229,7 @@ def posterior(
     bins: Bins,
     *,
     spread: float | None = None,
-    noise: float | None = None,
+    noise: bool | None = None,
     background: float = 0.0,
     pilot_spread: float = 0.0,
     is_pilot: bool = False,
@@ -240,8 +241,10 @@ def posterior(
     Parameters
     ----------
     bins : Bins
-    spread, noise : float, optional
-        Of a known point spread function (spacings), of known white noise (rms increments).
+    spread : float, optional
+        Of a known point spread function, spacings.
+    noise : bool, optional
+        Whether there is white noise. Its height, if that is known, is in the bins.
     background : float
         See `hypotheses`.
     pilot_spread : float
@@ -360,13 +363,13 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e3) -> tuple[Array,
     density.
 
     A bin beyond a cut has the expected logarithm of the density of a deviation of a factor of e. `flat` is
-    the variance of ln A: two deviations are a factor of e^63.
+    the variance of ln A: two deviations are a factor of e^63. Known noise determines A.
     """
     octaves = bins.lnq / _OCTAVE
     inside = np.ix_(kind.inside, kind.inside)
     correlation = np.exp(-np.abs(octaves[:, None] - octaves))
     covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
-    lower = np.linalg.cholesky(covariance[inside] + flat)
+    lower = np.linalg.cholesky(covariance[inside] + (0.0 if bins.noise > 0.0 else flat))
     whitening = np.zeros(covariance.shape)
     # above the diagonal the library leaves zeros or rounding, in one process not as in another
     whitening[inside] = np.tril(np.linalg.inv(lower))

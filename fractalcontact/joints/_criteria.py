@@ -173,7 +173,7 @@ def patton(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     """Return the strength of asperities that are overridden or sheared off, whichever needs less."""
     overridden = pressure * math.tan(math.radians(joint.basic_friction_angle + joint.asperity_angle))
     sheared = joint.cohesion + pressure * math.tan(math.radians(joint.residual_friction_angle))
-    return np.minimum(overridden, sheared), np.ones(pressure.shape, dtype=bool)
+    return np.minimum(overridden, sheared), ~(pressure > joint.wall_strength)  # which may be unknown
 
 
 def ladanyi_archambault(pressure: Array, joint: Joint) -> tuple[Array, Array]:

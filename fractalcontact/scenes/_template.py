@@ -141,7 +141,7 @@ def template(
         prepared["level"] = 1 if level is None else level
     faces = {"surface": _file_table(scan, folder, options | prepared)}
     if is_joint:
-        if facts["in_plane"]:  # of points: the second face on the plane and the cells of the first
+        if facts["of_points"]:  # of points: the second face on the plane and the cells of the first
             options = {key: value for key, value in options.items() if key != "spacing"} | {
                 "plane": OF_SURFACE
             }
@@ -230,7 +230,8 @@ def _facts(surface: xr.DataArray) -> dict[str, Any]:
         "slope": float(statistics["rms_slope"]),
         "missing": bool(surface.isnull().any()),
         "periodic": any("period" in surface[dim].attrs for dim in ("y", "x")),
-        "in_plane": "gridding" in provenance_of(surface),
+        "of_points": "gridding" in provenance_of(surface),
+        "in_plane": provenance_of(surface).get("plane") == "best fit",
     }
 
 

@@ -377,3 +377,21 @@ def test_estimates_do_not_depend_on_the_threads_of_blas():
         for threads in ("1", "2")
     }
     assert len(printed) == 1
+
+
+@pytest.mark.parametrize(("hurst", "noise"), [(0.9, 0.3), (0.3, 1.0)])
+def test_known_noise_gives_a_narrower_interval_that_holds(hurst, noise):
+    """The amplitude of the surface is unknown, that of the noise is not."""
+    free, known = [], []
+    for seed in range(8):
+        surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=hurst, rms_increment=2e-6, rng=seed)
+        white = noise * 2e-6 * np.random.default_rng(99 + seed).standard_normal(surface.shape)
+        for results, height in ((free, None), (known, noise * 2e-6)):
+            results.append(
+                fc.dimensions.estimate(surface.copy(data=surface.values + white), noise=height).isel(method=0)
+            )
+    low, high = (np.array([float(result[name]) for result in known]) for name in ("ci_low", "ci_high"))
+    assert np.sum((low <= hurst) & (high >= hurst)) >= 7
+    error = [np.sqrt(np.mean([(float(r.hurst) - hurst) ** 2 for r in results])) for results in (free, known)]
+    assert error[1] < error[0]
+    assert np.median([float(result.rms_increment) for result in known]) == pytest.approx(2e-6, rel=0.15)

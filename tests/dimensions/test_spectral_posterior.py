@@ -24,7 +24,7 @@ def log_density(bins, theta, form=0):
 @pytest.mark.parametrize("hurst", [0.3, 0.7])
 def test_one_exponent_by_quadrature(hurst):
     bins = bins_of(hurst)
-    found = sp.posterior(bins, spread=0.0, noise=0.0)
+    found = sp.posterior(bins, spread=0.0, noise=False)
     plain = next(m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0)
     grid = np.linspace(0.01, 0.99, 2000)
     logs = np.array([log_density(bins, np.array([h, 0.0, 0.0, 0.0, 0.0, 1.0])) for h in grid])

@@ -33,7 +33,7 @@ def test_roughness_of_a_list_of_points(scans):
     tree = fc.open(scans / "scan_roughness" / "result.nc")
     result = tree["dimensions"].to_dataset().sel({"method": "default"})
     expected = fc.dimensions.estimate(fc.surfaces.read("scan.xyz", units="mm")).sel({"method": "default"})
-    assert float(result.hurst) == float(expected.hurst)
+    assert float(result.hurst) == pytest.approx(float(expected.hurst), abs=1e-6)  # a plane was subtracted
     assert float(result.ci_low) < HURST < float(result.ci_high)
     assert "roughness_coefficient" in tree["joints"].children
     names = {path.name for path in (scans / "scan_roughness").iterdir()}
@@ -118,6 +118,22 @@ def test_joint_with_a_spike_as_scanned(scans):
     assert lifted[0] > 0.8e-3 > 0.1e-3 > lifted[1]
     title = tomllib.loads((scans / "spiked" / "joint.toml").read_text())["title"]
     assert title == "Joint of lower.nc and spiked.nc"
+
+
+def test_points_on_a_grid_are_levelled_as_the_heights_that_they_are(scans):
+    """Points between the cells are gridded on their best plane, and not levelled again."""
+    rng, surface = (
+        np.random.default_rng(3),
+        fc.surfaces.fbm((40, 40), 2e-4, hurst=0.8, rms_increment=1e-5, rng=1),
+    )
+    fc.save(surface.to_dataset(name="height"), "grid.nc")
+    y, x = np.meshgrid(surface.y, surface.x, indexing="ij")
+    points = 1e3 * np.stack([x, y, surface.values], axis=-1).reshape(-1, 3)
+    np.savetxt("grid.xyz", points, fmt="%.9f")
+    np.savetxt("cloud.xyz", points + np.r_[0.06, 0.06, 0.0] * rng.normal(size=points.shape))
+    assert "level = 1" in fc.scenes.template("roughness", "grid.nc")
+    assert "level = 1" in fc.scenes.template("roughness", "grid.xyz", units="mm")
+    assert "level" not in fc.scenes.template("roughness", "cloud.xyz", units="mm")
 
 
 def test_summary_says_how_a_cloud_was_gridded(scans):
