@@ -298,5 +298,6 @@ def _along(fit: AzimuthFit, azimuth: float, along: Array, every: Array, unit: fl
     increment = fit.scale * float(np.sqrt(np.exp(along[0]) * lag**hurst))
     estimate = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high, rms_increment=increment * unit)
     if not reason and high - low > WIDEST:
-        reason = f"the heights do not determine the exponent: {low:.2f} to {high:.2f} is as likely"
+        ends = f"{max(low, 0.0):.2f} to {min(high, 1.0):.2f}"
+        reason = f"the heights do not determine the exponent: {ends} is as likely"
     return estimate.without_interval(reason) if reason else estimate

@@ -250,12 +250,15 @@ def test_without_the_finest_scale_the_dimension_is_wrong():
     np.testing.assert_array_less(0.99 * float(surface.finest_scale), resolved.scale_min)
 
 
-def test_directions_use_resolved_lags():
-    """An isotropic cloud gridded finely has no direction of smooth waves: H is not that of the gridding."""
+def test_directions_of_a_fine_grid_have_no_interval_of_its_own_waves():
+    """Few waves of an isotropic cloud are resolved by its points; those of the gridding do not count."""
     surface = fc.surfaces.from_points(measured_points("random", 0.5, 3), 2e-4, plane="xy")
-    hurst = fc.dimensions.directions(surface).hurst
-    smooth = fc.dimensions.directions(surface.drop_vars("finest_scale")).hurst
-    assert abs(float(hurst.mean()) - 0.5) + 0.1 < float(smooth.mean()) - 0.5
+    resolved = fc.dimensions.directions(surface)
+    every = fc.dimensions.directions(surface.drop_vars("finest_scale"))
+    for result, words in ((resolved, "do not determine"), (every, "on lines between")):
+        assert float(result["isotropy_p_value"]) > 0.01
+        assert np.isnan(result["ci_low"]).all()
+        assert words in result["ci_low"].attrs["reason"]
 
 
 @pytest.mark.parametrize(
