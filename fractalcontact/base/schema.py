@@ -608,6 +608,9 @@ def encoded(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) -> None:
+    if name not in QUANTITIES:
+        where = "`public_result(quantities=...)` of its function, or `base/schema.py`"
+        raise KeyError(f"variable {name!r} has no unit: give it a Quantity in {where}")
     attributes = QUANTITIES[name].labels.copy()
     if name in CORE_DIMS and "period" in variable.attrs:
         attributes["period"] = float(variable.attrs["period"])

@@ -7,7 +7,7 @@ from fractalcontact.base import schema
 
 
 def test_unknown_name_is_an_error():
-    with pytest.raises(KeyError):
+    with pytest.raises(KeyError, match="'nonsense' has no unit: give it a Quantity in"):
         schema.label(xr.Dataset({"nonsense": 1.0}))
 
 

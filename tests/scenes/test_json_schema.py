@@ -69,10 +69,12 @@ def scene(name):
 
 
 def test_the_shipped_schema_is_that_of_this_version():
-    """To write it anew: `Path(name).write_text(json.dumps(fc.scenes.json_schema(), indent=1) + chr(10))`."""
     jsonschema.Draft7Validator.check_schema(SCHEMA)
     shipped = (DATASETS / "fractalcontact.schema.json").read_text(encoding="utf-8")
-    assert shipped == json.dumps(SCHEMA, indent=1) + "\n"
+    # without the difference of two texts of a thousand lines, which hides the command
+    is_current = shipped == json.dumps(SCHEMA, indent=1) + "\n"
+    command = "import json, fractalcontact as fc; print(json.dumps(fc.scenes.json_schema(), indent=1))"
+    assert is_current, f"write it anew: python -c '{command}' > datasets/fractalcontact.schema.json"
 
 
 @pytest.mark.parametrize("name", SHIPPED)
