@@ -2,6 +2,7 @@
 
 import json
 import multiprocessing
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,20 @@ import every_call
 import pytest
 
 MODES = [("threads", "fork"), ("forkserver", "spawn")]
+# calls whose sums and products of 300 x 300 numbers had other last digits with two threads of BLAS
+BY_BLAS = {
+    "describe": """
+s = fc.surfaces.fbm((300, 300), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
+r = fc.surfaces.describe(s).drop_vars('run_time')
+print([r[name].item() for name in r])
+""",
+    "estimate": """
+s = fc.surfaces.fbm((300, 307), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
+holes = s.where(np.random.default_rng(2).random(s.shape) > 0.1)
+print([[fc.dimensions.estimate(z)[name].item().hex() for name in ('hurst', 'ci_low', 'ci_high')]
+    for z in (s, holes, s[0])])
+""",
+}
 
 
 def test_every_public_function_has_a_call():
@@ -26,3 +41,20 @@ def test_every_function_returns_the_same_numbers(modes):
     done = subprocess.run(words, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     assert json.loads(done.stdout.splitlines()[-1]) == {}
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("call", BY_BLAS)
+def test_results_do_not_depend_on_the_threads_of_blas(call):
+    words = [sys.executable, "-c", f"import fractalcontact as fc, numpy as np{BY_BLAS[call]}"]
+    printed = {
+        subprocess.run(
+            words,
+            env=os.environ | {"OPENBLAS_NUM_THREADS": threads},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for threads in ("1", "2")
+    }
+    assert len(printed) == 1

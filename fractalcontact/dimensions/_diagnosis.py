@@ -7,6 +7,7 @@ repaired here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -73,6 +74,11 @@ def rounding_step(
     step = float(gaps[gaps > tolerance * np.median(gaps)].min())
     multiples = (levels - levels[0]) / step
     return step if np.abs(multiples - np.rint(multiples)).max() <= tolerance else 0.0
+
+
+def rounding_noise(surface: Surface) -> float:
+    """Return the rms height of the rounding of scaled heights, which counts as white noise."""
+    return math.hypot(rounding_step(surface) / math.sqrt(12.0), float(np.finfo(float).eps))
 
 
 def unevenness(heights: Array, blocks: int = 8, parts: int = 4) -> float:

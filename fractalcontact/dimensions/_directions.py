@@ -14,7 +14,7 @@ from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._azimuths import IMPROBABLE, LARGEST_LOG_RATIO, AzimuthFit, fit_azimuths
-from fractalcontact.dimensions._diagnosis import diagnose, rounding_step
+from fractalcontact.dimensions._diagnosis import diagnose
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
 from fractalcontact.dimensions._metric_spectrum import squared_length
 from fractalcontact.dimensions._records import (
@@ -57,7 +57,7 @@ _NO_VARIATION = "the heights do not vary along this direction"
 _LEAST_SHARE = 1e-4  # of a maximum of the posterior that counts
 _NO_MODEL = "the surface does not fit the model, anisotropic fractional Brownian: the scatter is unknown"
 _UNCORRELATED = "heights without correlation have no anisotropy ratio"
-_FILLED = "waves of the filled gaps are shorter than those of the surface, a smooth one: give a complete part"
+_FILLED = "the surface is smooth, and filling its gaps made shorter waves than it has: give a complete part"
 _RIDGES = (
     "the anisotropy is stronger than any ratio that the fit can find: ridges continue along the azimuth, or "
     "spikes stand out"
@@ -247,7 +247,7 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
     surface, note = without_waves(surface)
     dx = surface.spacing[1]
     lengths = None if scales is None else (scales[0] / dx, scales[1] / dx)
-    fit = fit_azimuths(surface, rounding_step(surface), lengths)
+    fit = fit_azimuths(surface, lengths)
     if fit is None:
         record = (smooth() if scales is None else undefined(NO_MODES)).limited()
         return _Directional([record] * azimuths.size, None, record.note)

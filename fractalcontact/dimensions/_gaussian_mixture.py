@@ -46,12 +46,15 @@ FORMS = {ALIASED: Form(0.75, 0.4), FILTERED: Form(0.0, 0.4), UNALIASED: Form(0.2
 _LOGITS = np.linspace(-5.3, 5.3, 43)
 # of the cubics that are one at -1, 0, 1 or 2, and zero at the others: coefficients of the powers, by column
 _CUBICS = np.array([[0, 6, 0, 0], [-2, -3, 6, -1], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6.0
+# of the spreads of a table: of a first fit, and of the posterior. Near the axes the power of a blur ends at
+# that of the edges, where a cubic needs short steps
+_SPREAD_STEPS = 0.25, 0.1
 FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
 
 
-def mixture(lowest: int) -> Array:
-    """Return the scales t of the Gaussians, in squared x spacings."""
-    return 2.0 ** np.arange(lowest, HIGHEST)
+def mixture(longest: float) -> Array:
+    """Return the scales t of the Gaussians, from one of eight edges `longest` on, in squared x spacings."""
+    return 2.0 ** np.arange(-2 * math.ceil(math.log2(8.0 * longest)) - 2, HIGHEST)
 
 
 def weights(
@@ -280,9 +283,13 @@ def _cubic(place: Array, size: int) -> tuple[Array, Array, Array]:
     return first, powers @ _CUBICS, (powers[:, :3] * np.arange(1.0, 4.0)) @ _CUBICS[1:]
 
 
-def spread_nodes(longest: float, step: float) -> tuple[Array, Array]:
-    """Return the spreads of a table up to `longest`, and (FIRST_SPREAD, step of asinh(s / FIRST_SPREAD))."""
-    number = math.ceil(math.asinh(longest / FIRST_SPREAD) / step) + 3
+def spread_nodes(shortest_edge: float, *, is_pilot: bool) -> tuple[Array, Array]:
+    """Return the spreads of a table, and (FIRST_SPREAD, step of asinh(s / FIRST_SPREAD)), in x spacings.
+
+    They reach a twelfth of the shortest edge, or one spacing.
+    """
+    step = _SPREAD_STEPS[not is_pilot]
+    number = math.ceil(math.asinh(max(1.0, shortest_edge / 12.0) / FIRST_SPREAD) / step) + 3
     return FIRST_SPREAD * np.sinh(step * np.arange(number)), np.array([FIRST_SPREAD, step])
 
 
@@ -362,8 +369,7 @@ class Lattice:
     @cached_property
     def t(self) -> Array:
         """Scales of the Gaussians: from one of eight extents on."""
-        longest = max(n * d for n, d in zip(self.shape, self.steps, strict=True))
-        return mixture(-2 * math.ceil(math.log2(8.0 * longest)) - 2)
+        return mixture(max(n * d for n, d in zip(self.shape, self.steps, strict=True)))
 
     def transforms(self, spread: float, *, edges: bool) -> list[list[Array]]:
         """Return for each form the transforms (t, modes) of each Gaussian along y and x.

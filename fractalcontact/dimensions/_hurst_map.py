@@ -28,7 +28,7 @@ from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._diagnosis import resampling, rounding_step
+from fractalcontact.dimensions._diagnosis import resampling, rounding_noise
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, ModeFit, fitted_modes
 from fractalcontact.dimensions._mode_bins import (
@@ -39,6 +39,7 @@ from fractalcontact.dimensions._mode_bins import (
     expected_power,
     fill,
     gaussian_surfaces,
+    log_means,
     make_bins,
 )
 from fractalcontact.dimensions._records import CONSTANT, NORMAL, Estimate, plane, smooth, undefined
@@ -214,11 +215,9 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
         others = undefined(NO_MODES) if fit is None or scales is not None else smooth()
         return [record or (plane() if is_plane else others) for record in records]
     mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
-    from scipy.special import digamma, polygamma
-
     degrees = 0.5 * model.lattice.degrees * model.count * share
-    level = np.log(np.maximum(mean, 1e-300)) + np.log(degrees) - digamma(degrees)
-    mixture = model.components(level, polygamma(1, degrees), windows.new_share, scales is not None)
+    levels = log_means(np.maximum(mean, 1e-300), degrees)
+    mixture = model.components(*levels, windows.new_share, scales is not None)
     quantiles = (mixture_quantile(share, *mixture) for share in (0.025, 0.5, 0.975))
     for place, low, hurst, high in zip(chosen, *quantiles, strict=True):
         record = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high)
@@ -286,11 +285,10 @@ class _Model:
         number = bin_numbers(lattice, keep).ravel()
         order = np.argsort(number, kind="stable")[np.count_nonzero(number < 0) :]
         count = np.bincount(number[order])
-        background = math.hypot(rounding_step(middle) / math.sqrt(12.0), float(np.finfo(float).eps))
         return cls(
             fit,
             fit.scale * middle.unit,
-            background / fit.scale,
+            rounding_noise(middle) / fit.scale,
             lattice,
             pilot,
             order,

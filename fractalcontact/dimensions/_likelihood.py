@@ -20,7 +20,7 @@ import numpy as np
 from fractalcontact.base.regression import detrended
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.units import quantity_text
-from fractalcontact.dimensions._diagnosis import diagnose, rounding_step, unevenness
+from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise, unevenness
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
@@ -133,7 +133,7 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
         )
         return undefined(f"{number} modes {what}, at least {LEAST * LEAST_BINS} are needed")
     unit = fit.scale * surface.unit
-    background = math.hypot(rounding_step(surface) / math.sqrt(12.0), float(np.finfo(float).eps)) / fit.scale
+    background = rounding_noise(surface) / fit.scale
     bins = fit.bins(keep)
     known = 0.0 if not noise else math.hypot(noise / unit, background)
     bins = replace(bins, noise=known)

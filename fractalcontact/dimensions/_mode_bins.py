@@ -29,10 +29,10 @@ PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
 LEAST_BINS = 3  # an amplitude, an exponent, and one that can contradict them
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
-# Of a table: modes of a bin, step of `spread_nodes`; of a first fit, and of the posterior. Near the axes the
-# power of a blur ends at that of the edges, where a cubic needs short steps: with the first pair it is off by
-# 7 % (1024 x 1024 points: chi square of 235, with the second .6; for another form than the pilot 18, 1.6)
-_SAMPLES, _SPREAD_STEPS = (64, 256), (0.25, 0.1)
+# Modes of a bin in a table of a first fit, and of the posterior. With the first number, and its steps of the
+# spread, the power is off by 7 % (1024 x 1024 points: chi square of 235, with the second .6; for another form
+# than the pilot 18, 1.6)
+_SAMPLES = 64, 256
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
 _FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
@@ -186,8 +186,6 @@ def levels_by_azimuth(
 
     Up to `isotropic` radians per point aliases differ by less than 5 % for H above .1.
     """
-    from scipy.special import digamma, polygamma
-
     y, x = lattice.wavenumbers
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
     limit = isotropic / max(lattice.spacing)
@@ -198,13 +196,23 @@ def levels_by_azimuth(
     sector = _sectors(y[rows], x[columns])
     count = np.bincount(sector, minlength=_SECTORS)
     known = count > 0
-    degrees = 0.5 * lattice.degrees * count[known]
     level, information = np.zeros(_SECTORS), np.zeros(_SECTORS)
-    information[known] = 1.0 / polygamma(1, degrees)
     mean = np.bincount(sector, ratio[rows, columns], minlength=_SECTORS)[known] / count[known]
-    values = np.log(np.maximum(mean, 1e-12)) + np.log(degrees) - digamma(degrees)
+    values, variance = log_means(np.maximum(mean, 1e-12), 0.5 * lattice.degrees * count[known])
+    information[known] = 1.0 / variance
     level[known] = values - information[known] @ values / information.sum() if known.any() else 0.0
     return Levels(level, information, rows, columns)
+
+
+def log_means(mean: Array, degrees: Array) -> tuple[Array, Array]:
+    """Return the logarithms of mean powers, without their bias, and their variances.
+
+    `degrees`: half the real Gaussian numbers in a mean.
+    """
+    from scipy.special import digamma, polygamma
+
+    logs = np.log(mean) + np.log(degrees) - digamma(degrees)
+    return np.asarray(logs), np.asarray(polygamma(1, degrees))
 
 
 def _sectors(y: Array, x: Array) -> Array:
@@ -239,12 +247,9 @@ def make_bins(
     is_pilot : bool
         For a first estimate of the spectrum: with a coarser table.
     """
-    from scipy.special import digamma, polygamma
-
     classes = _bin_classes(lattice, keep, is_tapered=is_tapered)
     ratio, count = power / pilot, classes.count
-    sample, step = _SAMPLES[not is_pilot], _SPREAD_STEPS[not is_pilot]
-    total, lnq, chosen = _sums(classes, ratio, lattice, sample)
+    total, lnq, chosen = _sums(classes, ratio, lattice, _SAMPLES[not is_pilot])
     mean = total / count
     if is_tapered:
         places = _sums(classes, ratio, lattice, _MEDIAN_SAMPLE)[2]
@@ -254,13 +259,13 @@ def make_bins(
     if np.ndim(information) > 0:
         share = _sums(classes, np.asarray(information), lattice, 1)[0] / count
     degrees = 0.5 * lattice.degrees * count * share * (TAPERED if is_tapered else 1.0)
-    level = np.log(np.maximum(mean, 1e-300)) + np.log(degrees) - digamma(degrees)
+    level, variance = log_means(np.maximum(mean, 1e-300), degrees)
     # expectations of an even sample of each bin
     bins, place = np.nonzero(chosen >= 0)[0], chosen[chosen >= 0]
     weight = 1.0 / (pilot.ravel()[place] * np.bincount(bins)[bins])
     rows, columns = np.divmod(place, pilot.shape[1])
     ends = np.cumsum(np.bincount(bins))
-    spreads, nodes = spread_nodes(max(1.0, lattice.shortest_edge / 12.0), step)
+    spreads, nodes = spread_nodes(lattice.shortest_edge, is_pilot=is_pilot)
     tables = np.zeros((len(FORMS), spreads.size, count.size, lattice.t.size))
     for k, spread in enumerate(spreads):
         transforms = lattice.transforms(float(spread), edges=True)
@@ -269,7 +274,7 @@ def make_bins(
             _average(weight, ends, rows, columns, *by_mode, table[k])
     return Bins(
         level=level,
-        variance=np.asarray(polygamma(1, degrees)),
+        variance=variance,
         tables=tables,
         nodes=nodes,
         t=lattice.t,
@@ -393,16 +398,19 @@ def _classes(lattice: Lattice, keep: Array, width: float, split: float) -> _Clas
     ends = np.exp(2.0 * (lowest + width * (np.arange(1.0, rings + 1.0) - 1e-9)))
     number, counts = np.full(keep.shape, -1, dtype=np.int16), np.zeros(2 * rings)
     _classify(y, x, lattice.spacing[0], keep, ends, (split - lowest) / width, number, counts)
-    joined, total, bins = np.zeros(counts.size + 1, dtype=np.int16), 0.0, 0
+    joined = joined_classes(counts)
+    return _Classes(number, np.append(joined, np.int16(-1)), np.bincount(joined, counts))
+
+
+def joined_classes(counts: Array) -> Array:
+    """Return for each class of modes the one that it is joined with: those of few modes with the next."""
+    joined, total, number = np.zeros(counts.size, dtype=np.int16), 0.0, 0
     for k, modes in enumerate(counts):
-        joined[k] = bins
+        joined[k] = number
         total += modes
         if total >= LEAST:
-            bins, total = bins + 1, 0.0
-    joined = np.minimum(joined, max(bins - 1, 0))
-    count = np.bincount(joined[:-1], counts)
-    joined[-1] = -1
-    return _Classes(number, joined, count)
+            number, total = number + 1, 0.0
+    return np.minimum(joined, max(number - 1, 0))
 
 
 def _sums(classes: _Classes, values: Array, lattice: Lattice, size: int) -> tuple[Array, Array, Array]:

@@ -8,9 +8,10 @@ The expected power of a bin b is
 with the Gaussians j of `_gaussian_mixture`: H is the exponent, s the spread of a blur, nu white noise over
 the rms increment, q_0 the wavenumber beyond which long waves have the exponent H_2, k the sharpness of that
 corner: 1 where two surfaces were added, 1 / (1 + H) of a Matern covariance, large of a sudden plateau. The
-amplitude A has a flat prior in ln A, the others those of the constants below. Noise is absent with the
-probability .6, a blur with .85, a corner with .88; blur and sampling take one of three forms
-(`_gaussian_mixture.FORMS`). The logarithms of the bins are normal, and
+amplitude A has a flat prior in ln A, or is (n / nu)^2 where the height n of the noise is known; the others
+have those of the constants below. Noise is absent with the probability .6, a blur with .85, a corner with
+.88; blur and sampling take one of three forms (`_gaussian_mixture.FORMS`). The logarithms of the bins are
+normal, and
 
     y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
 
@@ -403,7 +404,7 @@ def _theta(u: Array, fixed: Array, prior: Array) -> Array:
     for k in (SPREAD, NOISE, SHARPNESS):
         theta[..., k] = np.exp(low[k] + high[k] * u[..., k])
     theta = np.where(np.isnan(fixed), theta, fixed)
-    # p of (1), and a corner half an octave of waves before the blur: those show the exponent H
+    # p of (1), and a corner below half of 1 / s: an octave of waves between corner and blur shows H
     difference = theta[..., LONG_HURST] - theta[..., HURST]
     theta[..., SHARPNESS] = np.hypot(theta[..., SHARPNESS] * difference, 0.01)
     theta[..., CORNER] /= 1.0 + 2.0 * theta[..., SPREAD] * theta[..., CORNER]

@@ -18,9 +18,8 @@ from fractalcontact.plotting._units import UNITS_EXPECTED
 P = ParamSpec("P")
 R = TypeVar("R")
 Test: TypeAlias = Callable[[Any], bool]
-Drawing: TypeAlias = Callable[
-    ..., Any
-]  # of the data and of what stands beside them; returns Axes, or several
+# of the data and of what stands beside them; returns Axes, or several
+Drawing: TypeAlias = Callable[..., Any]
 
 
 class StudyFigure(NamedTuple):

@@ -141,7 +141,7 @@ def template(
         prepared["level"] = 1 if level is None else level
     faces = {"surface": _file_table(scan, folder, options | prepared)}
     if is_joint:
-        if facts["of_points"]:  # of points: the second face on the plane and the cells of the first
+        if facts["of_points"]:  # the second face on the plane and the cells of the first
             options = {key: value for key, value in options.items() if key != "spacing"} | {
                 "plane": OF_SURFACE
             }

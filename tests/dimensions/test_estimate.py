@@ -1,9 +1,6 @@
 """Estimates of the Hurst exponent: names, labels, families, limits, errors, invariances."""
 
 import functools
-import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -355,28 +352,6 @@ def test_heights_whose_squares_overflow(rough, of_rough, factor):
     for curve in ("spectrum", "variogram", "cube_counts", "roughness_length"):
         with pytest.raises(InvalidInput, match="whose squares are numbers"):
             getattr(fc.dimensions, curve)(far)
-
-
-@pytest.mark.processes
-def test_estimates_do_not_depend_on_the_threads_of_blas():
-    """Sums and products of 300 x 300 numbers by BLAS have other last digits with two threads."""
-    call = (
-        "import fractalcontact as fc, numpy as np; s = fc.surfaces.fbm((300, 307), 1e-4, hurst=0.8, "
-        "rms_increment=1e-6, rng=1); holes = s.where(np.random.default_rng(2).random(s.shape) > 0.1); "
-        "print([[fc.dimensions.estimate(z)[name].item().hex() for name in ('hurst', 'ci_low', 'ci_high')] "
-        "for z in (s, holes, s[0])])"
-    )
-    printed = {
-        subprocess.run(
-            [sys.executable, "-c", call],
-            env=os.environ | {"OPENBLAS_NUM_THREADS": threads},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for threads in ("1", "2")
-    }
-    assert len(printed) == 1
 
 
 @pytest.mark.parametrize(("hurst", "noise"), [(0.9, 0.3), (0.3, 1.0)])

@@ -1,9 +1,5 @@
 """Statistics of surfaces: closed forms, gaps, units, constant surfaces, labels."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -274,23 +270,3 @@ def test_infinite_heights_of_a_dask_array_are_refused():
     lazy = fc.surfaces.from_array(da.from_array(heights, chunks=8), 1e-5)
     with pytest.raises(InvalidInput, match="finite heights, or NaN where missing, got 1 infinite"):
         fc.surfaces.describe(lazy)
-
-
-@pytest.mark.processes
-def test_statistics_do_not_depend_on_the_threads_of_blas():
-    """A sum of 300 x 300 products by BLAS has other last digits with two threads than with one."""
-    call = (
-        "import fractalcontact as fc; s = fc.surfaces.fbm((300, 300), 1e-4, hurst=0.8, rms_increment=1e-6, "
-        "rng=1); r = fc.surfaces.describe(s).drop_vars('run_time'); print([r[name].item() for name in r])"
-    )
-    printed = {
-        subprocess.run(
-            [sys.executable, "-c", call],
-            env=os.environ | {"OPENBLAS_NUM_THREADS": threads},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for threads in ("1", "2")
-    }
-    assert len(printed) == 1

@@ -1,0 +1,64 @@
+"""Expected power of Fourier modes under a metric, beside sums over all pairs of points."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from fractalcontact.dimensions._azimuths import PlaneModes
+from fractalcontact.dimensions._gaussian_mixture import ALIASED
+from fractalcontact.dimensions._metric_spectrum import MetricSpectrum, metric_of, squared_length
+
+SHAPE, DY = (36, 33), 1.3
+STENCIL = {
+    (0, 0): -2.0 / DY**2 - 2.0,
+    (1, 0): DY**-2,
+    (-1, 0): DY**-2,
+    (0, 1): 1.0,
+    (0, -1): 1.0,
+}
+
+
+def spectrum(hurst, metric, noise=0.0):
+    return MetricSpectrum(np.array([hurst, 0.0, noise, 0.0, 0.0, 1.0]), ALIASED, metric, DY)
+
+
+def by_pairs(hurst, metric, noise):
+    """Return the expected squared modes of the tapered Laplacian of heights with the variogram (r' M r)^H.
+
+    The covariance of the Laplacian is that of the heights, minus half the variogram, under both stencils.
+    """
+    modes = PlaneModes(SHAPE, DY, False)
+    ny, nx = modes.shape
+    y, x = np.meshgrid(np.arange(1 - ny, ny), np.arange(1 - nx, nx), indexing="ij")
+    covariance = np.zeros(y.shape)
+    for (a, one), (b, two) in itertools.product(STENCIL.items(), repeat=2):
+        down, across = y + a[0] - b[0], x + a[1] - b[1]
+        heights = -0.5 * squared_length(metric, down * DY, across * 1.0) ** hurst
+        covariance += one * two * (heights + noise**2 * ((down == 0) & (across == 0)))
+    taper = np.outer(*modes.tapers)
+    pairs = np.zeros((ny, nx))
+    rows, columns = np.arange(ny), np.arange(nx)
+    for i, j in itertools.product(rows, columns):
+        part = covariance[ny - 1 + rows - i][:, nx - 1 + columns - j] * taper
+        phase = np.exp(2j * np.pi * (np.fft.fftfreq(ny)[:, None] * i + np.fft.fftfreq(nx) * j))
+        pairs += taper[i, j] * (np.fft.fft2(part) * phase).real
+    return pairs[:, : nx // 2 + 1] / np.sum(taper**2), modes
+
+
+@pytest.mark.parametrize(("hurst", "ratio", "noise"), [(0.3, 4.0, 0.0), (0.8, 2.0, 0.0), (0.5, 3.0, 0.2)])
+def test_expected_power_of_an_oblique_metric_is_that_of_all_pairs(hurst, ratio, noise):
+    """To .1 %, but for the longest wave, whose density depends on the azimuth alone."""
+    u, v = np.log(ratio) * np.cos(np.radians(60.0)), np.log(ratio) * np.sin(np.radians(60.0))
+    expected, modes = by_pairs(hurst, metric_of(u, v), noise)
+    q = np.hypot(modes.y, modes.x)
+    others = modes.half & (q > 1.001 * q[modes.half].min())
+
+    def deviations(metric):
+        return np.abs(modes.expected(spectrum(hurst, metric, noise))[0] / expected - 1.0)
+
+    right = deviations(metric_of(u, v))
+    assert np.median(right[modes.half]) < 1e-3
+    assert right[others].max() < 0.02
+    for wrong in (metric_of(0.0, 0.0), metric_of(u, -v)):
+        assert np.median(deviations(wrong)[modes.half]) > 0.1
