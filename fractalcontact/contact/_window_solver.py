@@ -193,8 +193,9 @@ class WindowSolver:
     def few_nodes(self) -> int:
         """Return the number of candidates up to which sums over pairs are faster than transforms."""
         along_an_edge = np.sqrt(self.problem.gap.size)
-        # 1 and 10 for each node along an edge took the same time on 128 x 128 nodes at light loads
-        return min(1000, max(64, int(4.5 * along_an_edge)))
+        # 1 and 10 for each node along an edge took the same time on 128 x 128 nodes at light loads;
+        # on 512 x 512 nodes three loads took 1.1 times as long with at most 300 or 4000 of them as with 1000
+        return min(1000, int(4.5 * along_an_edge))
 
     def closure_bound(self, control: Control) -> float:
         """Return the closure imposed, or that of a flat disc around the whole extent, a lower bound."""
@@ -318,7 +319,7 @@ class WindowSolver:
             step = max(1, n // 16)  # coarse: steps of a path share a window; 4 and 64 took as many transforms
             box.append(slice(first // step * step, min(n, -(-last // step) * step)))
         size = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
-        if size > largest * near.size or min(s.stop - s.start for s in box) < 3:
+        if size > largest * near.size:
             return WHOLE_PLANE
         return box[0], box[1]
 

@@ -74,6 +74,18 @@ def test_elimination_matches_fast(influence, pressure):
     assert float(forced["closure"][0]) == pytest.approx(float(fast["closure"][0]), rel=1e-10)
 
 
+@pytest.mark.parametrize("shape", [(400, 8), (8, 400)])
+def test_contact_along_one_row_matches_elimination(shape):
+    """A box of one row, or of one column, has more candidates than sums over pairs take."""
+    rows, columns = np.indices(shape)
+    across = np.abs(columns - 4) if shape[0] > shape[1] else np.abs(rows - 4)
+    heights = 0.3e-6 * np.random.default_rng(1).standard_normal(shape) - 50e-6 * across
+    surface = fc.surfaces.from_array(heights, 1e-4)
+    fast = fc.contact.press(surface, contact_modulus=15e9, closure=[1e-6, 2e-6])
+    paper = fc.contact.press(surface, contact_modulus=15e9, closure=[1e-6, 2e-6], method="elimination")
+    np.testing.assert_allclose(fast["normal_force"], paper["normal_force"], rtol=1e-8)
+
+
 @pytest.mark.parametrize("boundary", ["periodic", "free"])
 def test_controls_agree_and_path_is_reversible(boundary):
     options = {"contact_modulus": MODULUS, "boundary": boundary, "tolerance": 1e-12}
