@@ -101,10 +101,10 @@ class Press(ProcessorTime):
     def setup(self, name: str) -> None:
         """Make the surface."""
         self.surface = exact() if name == "free 256" else periodic(int(name.split()[1]))
-        self.pressures = [1e5, 1e6] if name == "free 256" else [1e6, 1e7]
+        self.pressures = {"free 256": [1e5, 1e6], "periodic 256": [1e6, 1e7], "periodic 32": [1e6]}[name]
 
     def time_press(self, _: str) -> None:
-        """Time two load steps."""
+        """Time one or two load steps."""
         fc.contact.press(self.surface, contact_modulus=1e9, nominal_pressure=self.pressures)
 
 
