@@ -32,7 +32,7 @@ def _argument(default: float = math.nan, **bounds: Any) -> Any:
 class Joint:
     """What a criterion of strength may depend on; NaN where it is not known.
 
-    The first fields are arguments of `strength_envelope`, the last ones are measured alone.
+    The fields with bounds are arguments of `strength_envelope`, the others are measured alone.
     """
 
     wall_strength: float = _argument(**POSITIVE)
@@ -49,9 +49,8 @@ class Joint:
 
     @classmethod
     def of(cls, given: Mapping[str, Any], measured: Mapping[str, Any]) -> Joint:
-        """Return the joint by arguments, None where they are not given, and by what is measured."""
-        names = [entry.name for entry in fields(cls)]
-        known = {name: float(given[name]) for name in names if given.get(name) is not None}
+        """Return the joint by all its arguments, None where they are not given, and by what is measured."""
+        known = {name: float(given[name]) for name in ARGUMENTS if given[name] is not None}
         defaults = {
             "tensile_strength": known["wall_strength"] / 10.0,  # of a hard rock (Hoek and Bray 1981)
             "residual_friction_angle": known["basic_friction_angle"],
@@ -59,11 +58,11 @@ class Joint:
         return cls(**defaults | {name: value.item() for name, value in measured.items()} | known)
 
 
+ARGUMENTS: dict[str, Mapping[str, Any]] = {
+    entry.name: entry.metadata for entry in fields(Joint) if entry.metadata
+}
 # of the arguments of the functions around these formulas
-BOUNDS: dict[str, Mapping[str, Any]] = {
-    "aperture": POSITIVE,
-    "compressive_strength": POSITIVE,
-} | {entry.name: entry.metadata for entry in fields(Joint) if entry.metadata}
+BOUNDS = ARGUMENTS | {"aperture": POSITIVE, "compressive_strength": POSITIVE}
 
 # Shear strength
 

@@ -1,5 +1,7 @@
 """Strength envelopes at worked values and limits."""
 
+import inspect
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,12 @@ import fractalcontact as fc
 
 S = 0.508e-3
 MPA = 1e6
+NEEDED = {"nominal_pressure": MPA, "wall_strength": 100 * MPA, "basic_friction_angle": 30}
+OPTIONAL = {
+    name: {"cohesion": MPA, "length": 1.0, "tensile_strength": 5 * MPA}.get(name, 10.0)
+    for name in inspect.signature(fc.joints.strength_envelope).parameters
+    if name not in ("surface", "criterion", "direction", *NEEDED)
+}
 
 
 @pytest.fixture(scope="module")
@@ -127,19 +135,25 @@ def test_asperity_angle_is_enough_without_a_surface():
 
 
 def test_default_criteria_are_those_with_their_arguments(surface):
-    options = {"nominal_pressure": MPA, "wall_strength": 100 * MPA, "basic_friction_angle": 30}
-    assert fc.joints.strength_envelope(surface, **options).criterion.values.tolist() == [
+    assert fc.joints.strength_envelope(surface, **NEEDED).criterion.values.tolist() == [
         "ladanyi_archambault",
         "barton_choubey",
         "xia",
     ]
     given = {"cohesion": MPA, "length": 1.0, "residual_friction_angle": 30}
-    result = fc.joints.strength_envelope(surface, **options, **given)
+    result = fc.joints.strength_envelope(surface, **NEEDED, **given)
     assert result.sizes == {"criterion": 6, "nominal_pressure": 1}
     assert (result.shear_strength > 0.999 * MPA * np.tan(np.radians(30))).all()
     tangent = np.tan(np.radians(result.friction_angle)) * result.nominal_pressure
     np.testing.assert_allclose(tangent, result.shear_strength)
     assert all(len(text) > 10 for text in result.assumption.values)
+
+
+@pytest.mark.parametrize("missing", [None, *OPTIONAL])
+def test_every_criterion_whose_arguments_are_given_has_a_strength(surface, missing):
+    """A criterion that takes an argument and does not say that it needs it would return NaN without it."""
+    given = {name: value for name, value in OPTIONAL.items() if name != missing}
+    assert np.isfinite(fc.joints.strength_envelope(surface, **NEEDED, **given).shear_strength).all()
 
 
 def test_xia_on_teeth_of_one_dip(make_face):
@@ -260,11 +274,5 @@ def test_a_plane_has_the_basic_strength(make_face):
     ],
 )
 def test_wrong_arguments_are_named(surface, options, message):
-    given = {
-        "surface": surface,
-        "nominal_pressure": MPA,
-        "wall_strength": 100 * MPA,
-        "basic_friction_angle": 30,
-    }
     with pytest.raises(ValueError, match=message):
-        fc.joints.strength_envelope(**given | options)
+        fc.joints.strength_envelope(**{"surface": surface} | NEEDED | options)

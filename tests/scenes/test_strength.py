@@ -48,15 +48,27 @@ def scene(tmp_path):
     return write
 
 
-@pytest.mark.parametrize("key", ["cohesion", "wall_strength"])
-def test_strengths_may_have_their_unit(scene, key):
-    section = "[joint.strength_envelope]\nwall_strength = 1e8\ncohesion = 1e6"
-    value = "1 MPa" if key == "cohesion" else "100 MPa"
-    with_unit = re.sub(rf"(?m)^{key} = .*$", f'{key} = "{value}"', section)
-    arguments = [
-        fc.scenes.load(scene(SCENE.replace(section, text))).tables["joint"]["strength_envelope"]
-        for text in (section, with_unit)
-    ]
+TABLES = {
+    name: table.get("anyOf", [table])[-1].get("properties", {})
+    for name, table in fc.scenes.json_schema()["properties"]["joint"]["properties"].items()
+}
+IN_PASCALS = [
+    (stage, key)
+    for stage, keys in TABLES.items()
+    for key, kind in keys.items()
+    if key not in ("closure", "normal_force") and re.search(r"\bPa\b(?!/| s)", kind.get("description", ""))
+]
+
+
+@pytest.mark.parametrize(("stage", "key"), IN_PASCALS)
+def test_every_argument_in_pascals_may_have_its_unit(scene, stage, key):
+    """As the docstring states it: `PRESSURES` of `scenes/_scene_keys.py` has a word for each."""
+    start = SCENE.partition("[joint.")[0]
+    texts = (
+        f"{start}[joint.{stage}]\n{key} = {value}\n[want]\nsurfaces = ['describe']"
+        for value in ("2e6", "'2 MPa'")
+    )
+    arguments = [fc.scenes.load(scene(text)).tables["joint"][stage] for text in texts]
     assert arguments[0] == arguments[1]
 
 
