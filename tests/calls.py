@@ -169,7 +169,7 @@ CALLS = {
     "contact.partial_slip": lambda: PRESS
     | {"surface": periodic(), "poisson": 0.2, "friction_coefficient": 0.5, "tangential_force": 0.01},
     "joints.Crack": lambda: {"lower": rough(), "upper": rough() + 1e-5, "young": 1e10, "poisson": 0.2},
-    "joints.area_dimension": lambda: {
+    "joints.area_by_resolution": lambda: {
         "crack": crack(), "shear": [1e-4], "factors": [1, 2], "normal_force": [1.0, 10.0],
     },
     "joints.direct_shear": lambda: {

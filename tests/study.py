@@ -65,7 +65,7 @@ FUNCTIONS = {
         "friction",
         "decorrelation_length",
         "transmissivity",
-        "area_dimension",
+        "area_by_resolution",
         "self_weight",
     ),
     "domains": ("box_dimension", "lacunarity", "islands", "evolution"),

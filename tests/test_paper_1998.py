@@ -47,7 +47,7 @@ normal_force = [{forces}]
 block = {part}
 shear = [8e-5, 8e-4]
 nominal_pressure = [2.5e6, 7.5e7]
-[joint.area_dimension]
+[joint.area_by_resolution]
 shear = [8e-4]
 nominal_pressure = [2.5e6, 2.5e7, 7.5e7]
 factors = [1, 2, 3]
@@ -60,7 +60,7 @@ surfaces = ["height"]
 dimensions = ["default", "variogram"]
 joints = ["closure", "delta_surface", "delta_dimension", "rigid_dilatancy",
           "elastic_dilatancy", "friction", "decorrelation_length", "transmissivity",
-          "elimination", "area_dimension", "self_weight"]
+          "elimination", "area_by_resolution", "self_weight"]
 domains = ["signature"]
 keep = ["state"]
 """

@@ -5,7 +5,7 @@ A study starts with a `Crack`: the two faces, the block that slides, and the mat
 delta_surface         the difference of the facing heights after a shear
 delta_dimension       the dimension of that difference, by area, variogram and spectrum
 closure               the closure of the faces under a path of load
-area_dimension        the contact area against the spacing of the heights
+area_by_resolution    the contact area against the spacing of the heights
 closure_laws          exponential and hyperbolic laws fitted to the closure, and the normal stiffness
 dilatancy             the opening of the faces during shear: rigid, under a normal force, or against a spring
 friction              friction angle and shear strength from the dilatancy

@@ -1,4 +1,4 @@
-from ._area_dimension import area_dimension as area_dimension
+from ._area_by_resolution import area_by_resolution as area_by_resolution
 from ._closure import bandis_closure as bandis_closure
 from ._closure import closure as closure
 from ._closure_laws import closure_laws as closure_laws
@@ -23,7 +23,7 @@ from ._uplift import uplift as uplift
 
 __all__ = [
     "Crack",
-    "area_dimension",
+    "area_by_resolution",
     "bandis_closure",
     "closure",
     "closure_laws",

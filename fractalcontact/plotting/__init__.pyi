@@ -3,7 +3,7 @@ from ._accuracy import estimator_errors as estimator_errors
 from ._closure import closure_laws as closure_laws
 from ._closure import hydraulic_aperture as hydraulic_aperture
 from ._closure import uplift as uplift
-from ._contact_curves import area_dimension as area_dimension
+from ._contact_curves import area_by_resolution as area_by_resolution
 from ._contact_curves import contact_area as contact_area
 from ._contact_curves import path as path
 from ._contact_curves import pressure_distribution as pressure_distribution
@@ -35,7 +35,7 @@ from ._strength import strength_envelope as strength_envelope
 
 __all__ = [
     "alluvial",
-    "area_dimension",
+    "area_by_resolution",
     "box_dimension",
     "closure_laws",
     "contact_area",

@@ -225,7 +225,7 @@ def _persson(pressure: Any, nominal: float, spread: float) -> Any:
 
 
 @figure
-def area_dimension(
+def area_by_resolution(
     result: Any, *, shear: float | None = None, units: Units | None = None, ax: Axes | None = None
 ) -> Axes:
     """Draw the real contact area of a joint against the spacing of its heights, one curve per load.
@@ -236,7 +236,7 @@ def area_dimension(
     Parameters
     ----------
     result : Dataset or node of a DataTree
-        From `fractalcontact.joints.area_dimension`.
+        From `fractalcontact.joints.area_by_resolution`.
     {shared}
 
     Examples
@@ -244,8 +244,8 @@ def area_dimension(
     >>> import fractalcontact as fc
     >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
     >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
-    >>> areas = fc.joints.area_dimension(crack, shear=4e-4, nominal_pressure=[1e6, 1e7])
-    >>> ax = fc.plotting.area_dimension(areas)
+    >>> areas = fc.joints.area_by_resolution(crack, shear=4e-4, nominal_pressure=[1e6, 1e7])
+    >>> ax = fc.plotting.area_by_resolution(areas)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     spacing (µm) | real contact area (%)
     """
@@ -307,7 +307,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
 FIGURES = (
     StudyFigure("joint_contact_area", "joints/closure", "contact_fraction", contact_area),
     StudyFigure("contact_area", "contact", "contact_fraction", _paths.by_decades(contact_area)),
-    StudyFigure("area_dimension", "joints/area_dimension", "resolution", area_dimension),
+    StudyFigure("area_by_resolution", "joints/area_by_resolution", "resolution", area_by_resolution),
     StudyFigure("slip_loops", "partial_slip", "stick_area", slip_loops),
     StudyFigure("joint_slip_loops", "joints/partial_slip", "stick_area", slip_loops),
 )

@@ -419,7 +419,7 @@ STAGES = (
         **_ONE,
     ),
     _joint(
-        "area_dimension",
+        "area_by_resolution",
         rows(
             "contact area against the spacing",
             ("shear", "resolution"),

@@ -368,7 +368,7 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
         )
     material = scene.material
     stages = [
-        name for name in ("closure", "area_dimension", "elastic_dilatancy") if name in scene.want.joints
+        name for name in ("closure", "area_by_resolution", "elastic_dilatancy") if name in scene.want.joints
     ]
     if stages and material.young is not None and material.poisson is not None:
         modulus = contact_modulus(material)

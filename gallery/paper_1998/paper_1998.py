@@ -237,7 +237,7 @@ def face_dimension(study, tolerance=0.05):
     "w_int within 10 % of that at the next spacing, at 2.5, 25 and 75 MPa and every shear",
 )  # fmt: skip
 def refinement(study, tolerance=0.1):
-    areas = sheared(study, "joints/area_dimension", shears=1)
+    areas = sheared(study, "joints/area_by_resolution", shears=1)
     closure, spacing = at_pressures(areas, "interface_closure"), areas["resolution"].values
     with np.errstate(divide="ignore", invalid="ignore"):
         change = closure[..., 0] / closure[..., 1] - 1.0
@@ -348,7 +348,7 @@ def area_proportional(study, tolerance=0.1, fewest=30):
     "10 % less at the finest than at the coarsest, at 2.5, 25 and 75 MPa and every shear",
 )  # fmt: skip
 def resolution(study, share=0.1):
-    areas = sheared(study, "joints/area_dimension", shears=1)
+    areas = sheared(study, "joints/area_by_resolution", shears=1)
     area = at_pressures(areas, "contact_fraction")
     falls = area[..., 0] <= (1 - share) * area[..., -1]
     spacing = listed(1e3 * areas["resolution"].values, ".3g")

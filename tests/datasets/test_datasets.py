@@ -141,7 +141,7 @@ PAPER = {
     "joints/delta_dimension": "its dimension over the shear",
     "joints/elimination": "successive eliminations of tension points",
     "joints/closure": "figures 3 and 4",
-    "joints/area_dimension": "the area depends on the discretization",
+    "joints/area_by_resolution": "the area depends on the discretization",
     "domains/signature": "lacunar contact domains",
     "domains/lacunarity": "lacunar contact domains",
     "joints/rigid_dilatancy": "figure 5a",

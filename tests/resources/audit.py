@@ -135,7 +135,7 @@ REQUIREMENTS = {
     "joints/delta_dimension": Requirement((FFT,), (*_SUMS.kernels, "covering area")),
     "joints/closure": _SOLVER,
     "joints/elimination": _SOLVER,
-    "joints/area_dimension": _SOLVER,
+    "joints/area_by_resolution": _SOLVER,
     "joints/self_weight": _SOLVER,
     "joints/elastic_dilatancy": _SOLVER,
     "joints/partial_slip": _SOLVER,

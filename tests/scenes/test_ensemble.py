@@ -24,7 +24,7 @@ ENSEMBLE = (
     .replace(
         'joints = ["closure", "rigid_dilatancy"]',
         'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
-        'joints = ["closure", "elastic_dilatancy", "friction", "elimination", "area_dimension",\n'
+        'joints = ["closure", "elastic_dilatancy", "friction", "elimination", "area_by_resolution",\n'
         '"self_weight", "delta_dimension", "decorrelation_length", "transmissivity"]\n'
         'domains = ["box_dimension", "islands"]\nfigures = true\n',
     )

@@ -34,7 +34,7 @@ normal_force = [1.0, 10.0]
 direction = ["E", "W"]
 [joint.elimination]
 block = 1.2e-3
-[joint.area_dimension]
+[joint.area_by_resolution]
 factors = [1, 2]
 [joint.self_weight]
 shear = [1e-4, 3e-4]
@@ -46,7 +46,7 @@ dimensions = ["likelihood", "variogram"]
 contact = ["press"]
 joints = [
     "delta_surface", "closure", "rigid_dilatancy", "elastic_dilatancy", "friction", "decorrelation_length",
-    "transmissivity", "elimination", "area_dimension", "self_weight",
+    "transmissivity", "elimination", "area_by_resolution", "self_weight",
 ]
 domains = [
     "box_dimension", "box_counts", "boundary_dimension", "lacunarity", "islands", "percolation", "evolution",
@@ -60,7 +60,7 @@ PATH = STUDY.replace(JOINTS, '"closure", "friction"').replace(ESTIMATES, "")
 DOMAINS_OF_A_JOINT = PATH.replace('contact = ["press"]', 'keep = ["state"]')
 ENSEMBLE = (
     STUDY.replace('contact = ["press"]', 'keep = ["state"]')
-    .replace('"elimination", "area_dimension", "self_weight",', "")
+    .replace('"elimination", "area_by_resolution", "self_weight",', "")
     .replace("rng = 5", "rng = 5\nmembers = 2")
     .replace('"box_counts", "boundary_dimension", "lacunarity", ', "")
 )

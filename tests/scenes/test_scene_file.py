@@ -259,11 +259,19 @@ def test_press_takes_its_modulus_from_the_material(write):
             "joint.self_weight.structure_size: expected(?s:.*)joint.self_weight.unit_weight: expected",
         ),
         ("self_weight", "[joint.self_weight]\nstructure_size = 0.0\nunit_weight = 1.0", "structure_size"),
-        ("area_dimension", "[joint.area_dimension]\nclosure = 1e-6", "joint.area_dimension.closure"),
-        ("area_dimension", '[joint.area_dimension]\ndirection = ["E", "W"]', "one direction for area_dim"),
         (
-            "area_dimension",
-            "[joint.area_dimension]\nnominal_pressure = 1e6\nnormal_force = 1.0",
+            "area_by_resolution",
+            "[joint.area_by_resolution]\nclosure = 1e-6",
+            "joint.area_by_resolution.closure",
+        ),
+        (
+            "area_by_resolution",
+            '[joint.area_by_resolution]\ndirection = ["E", "W"]',
+            "one direction for area_by",
+        ),
+        (
+            "area_by_resolution",
+            "[joint.area_by_resolution]\nnominal_pressure = 1e6\nnormal_force = 1.0",
             "exactly one of",
         ),
     ],
@@ -278,7 +286,7 @@ def test_problems_of_the_stages_of_the_paper_are_named(write, word, tables, name
     ("word", "table", "named"),
     [
         ("elimination", "block = 1.0", "block: expected"),
-        ("area_dimension", "factors = [1, 7]", "divisors of the 24 x 24 cells"),
+        ("area_by_resolution", "factors = [1, 7]", "divisors of the 24 x 24 cells"),
         ("self_weight", "structure_size = [2.0, 1.0]\nunit_weight = 1.0", "ascending sizes"),
     ],
 )

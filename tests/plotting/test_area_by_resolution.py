@@ -48,7 +48,7 @@ def strengths():
 def test_area_of_every_load_at_one_shear():
     result = areas()
     for options, shear in (({}, 1), ({"shear": 7e-3}, 2)):
-        figure = figure_of(plotting.area_dimension(result, **options))
+        figure = figure_of(plotting.area_by_resolution(result, **options))
         ax = figure.axes[0]
         curves = drawn(ax)
         assert len(curves) == 4
@@ -81,7 +81,7 @@ def test_strength_at_one_place_is_that_of_the_whole(dim):
 
 
 @pytest.mark.parametrize(
-    ("draw", "data"), [(plotting.area_dimension, strengths), (plotting.self_weight, areas)]
+    ("draw", "data"), [(plotting.area_by_resolution, strengths), (plotting.self_weight, areas)]
 )
 def test_other_results_are_refused(draw, data):
     with pytest.raises(ValueError, match="expected"):

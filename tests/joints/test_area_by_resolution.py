@@ -9,7 +9,7 @@ S = 8e-5
 
 
 def test_equals_the_contacts_of_every_spacing(crack):
-    result = fc.joints.area_dimension(
+    result = fc.joints.area_by_resolution(
         crack, shear=[S, 5 * S], direction="W", factors=[4, 1, 2], normal_force=[10.0, 1e3]
     )
     assert result.area_dimension.dims == ("shear", "step")
@@ -37,7 +37,7 @@ def test_equals_the_contacts_of_every_spacing(crack):
 
 
 def test_mated_faces_touch_everywhere_at_every_spacing(crack):
-    result = fc.joints.area_dimension(crack, shear=0.0, nominal_pressure=1e6)
+    result = fc.joints.area_by_resolution(crack, shear=0.0, nominal_pressure=1e6)
     np.testing.assert_allclose(result.resolution, [S, 2 * S, 3 * S])  # of 48 cells, at least 8 an edge
     assert (result.contact_fraction == 1).all()
     np.testing.assert_allclose(result.area_dimension, 2.0, atol=1e-12)
@@ -53,7 +53,7 @@ def test_smooth_face_has_an_area_of_its_own(make_face):
     crack = fc.joints.Crack(
         face, make_face(np.zeros((240, 240)), 1e-5), young=30e9, poisson=0.2, block=1.2e-3
     )
-    result = fc.joints.area_dimension(crack, shear=0.0, factors=[1, 2], normal_force=50.0)
+    result = fc.joints.area_by_resolution(crack, shear=0.0, factors=[1, 2], normal_force=50.0)
     assert 0.05 < float(result.contact_fraction[0, 0, 0]) < 0.5
     assert float(result.area_dimension.squeeze()) == pytest.approx(2.0, abs=0.1)
 
@@ -71,4 +71,4 @@ def test_smooth_face_has_an_area_of_its_own(make_face):
 )
 def test_wrong_arguments_are_named(crack, options, named):
     with pytest.raises(ValueError, match=named):
-        fc.joints.area_dimension.validate(crack, **({"shear": S, "nominal_pressure": 1e6} | options))
+        fc.joints.area_by_resolution.validate(crack, **({"shear": S, "nominal_pressure": 1e6} | options))

@@ -26,7 +26,7 @@ from fractalcontact.joints._sheared_contact import (
     pressed_dataset,
 )
 
-WHERE = "fractalcontact.joints.area_dimension"
+WHERE = "fractalcontact.joints.area_by_resolution"
 
 
 def _check(problems: Problems) -> None:
@@ -55,7 +55,7 @@ def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> 
 
 
 @public_result(title="contact area of a crack by spacing", check=_check, memory=PRESSING_BYTES)
-def area_dimension(
+def area_by_resolution(
     crack: Crack,
     *,
     shear: float | Sequence[float] | Array,
@@ -109,7 +109,7 @@ def area_dimension(
     >>> import fractalcontact as fc
     >>> face = fc.surfaces.fbm((96, 96), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
     >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=6.4e-3)
-    >>> result = fc.joints.area_dimension(crack, shear=4e-4, factors=[1, 2, 4], normal_force=1e3)
+    >>> result = fc.joints.area_by_resolution(crack, shear=4e-4, factors=[1, 2, 4], normal_force=1e3)
     >>> (100 * result.contact_fraction).round(1).values.tolist()  # %, 0.1, 0.2 and 0.4 mm apart
     [[[5.0, 6.3, 9.8]]]
     """
