@@ -78,6 +78,7 @@ def public_result(
     memory: Estimate = ARRAYS,
     reasons: Mapping[str, str] = NO_REASONS,
     quantities: Mapping[str, Quantity] = NO_QUANTITIES,
+    path_figure: str = "",
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates the call of a public function and labels its result.
 
@@ -104,6 +105,9 @@ def public_result(
     quantities : mapping
         Unit and meaning of the variables that no other function returns, by name; those of several functions
         are in `base.schema`.
+    path_figure : str
+        Variables with a space between them, of one unit, that `plotting.draw` draws along the path of load or
+        shear; an attribute of the result.
     """
     declare(quantities)
 
@@ -154,6 +158,8 @@ def public_result(
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
             result.attrs = {} if completeness is None else {"completeness": completeness}
+            if path_figure:
+                result.attrs["path_figure"] = path_figure
             parameters = bound.arguments | entries.pop("parameters", {})
             if achieved_error is not None:
                 entries.setdefault("achieved_error", achieved_error)

@@ -185,7 +185,11 @@ CROSSING_SOURCE = "Stauffer and Aharony, Introduction to Percolation Theory (199
 
 
 @public_result(
-    title="Percolation of a set", references=CROSSING_SOURCE, achieved_error="exact", check=check_connected
+    title="Percolation of a set",
+    references=CROSSING_SOURCE,
+    achieved_error="exact",
+    check=check_connected,
+    path_figure="largest_share coverage",
 )
 def percolation(
     mask: xr.DataArray,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,11 @@ from fractalcontact.plotting import (
     _size_curves,
     _strength,
 )
+from fractalcontact.plotting._contact_curves import path
 from fractalcontact.plotting._curves import curves
 from fractalcontact.plotting._dimensions import curve_of
 from fractalcontact.plotting._ensemble import draw_with_band, reduced_trees
-from fractalcontact.plotting._figure import Drawing, StudyFigure
+from fractalcontact.plotting._figure import StudyFigure
 from fractalcontact.plotting._style import Figure, drawn_for_files, figure_of
 from fractalcontact.plotting._units import UNITS_EXPECTED, Units, marked, require_units
 
@@ -58,7 +59,6 @@ def draw(
     progress: bool = False,
     formats: Sequence[str] = ("png",),
     units: Units | None = None,
-    figures: Mapping[str, Drawing] | None = None,
 ) -> list[Path]:
     """Draw every figure that a study has data for and write each one as a file.
 
@@ -76,9 +76,6 @@ def draw(
         Any of png, svg, pdf and csv: the numbers of the curves (`curves`), of the figures that have any.
     units : mapping of str to str, optional
         Unit of each variable by name, `{"normal_force": "kN"}`, in all figures. Default: a suitable prefix.
-    figures : mapping of str to function, optional
-        Further figures by the path of their group, `{"domains/percolation": draw_shares}`: functions of its
-        Dataset that return Axes. The file is called as the path, `domains_percolation.png`.
 
     Returns
     -------
@@ -112,21 +109,22 @@ def draw(
         ):
             for word in formats:
                 problems.choice("formats", word, FORMATS)
-        expected = "a mapping of paths of groups to functions, or None"
-        problems.require(figures is None or _are_drawings(figures), "figures", expected, figures)
     if units is not None:
         with Problems(WHERE):
             require_units([node.to_dataset() for node in tree.subtree], units)
         tree = tree.map_over_datasets(lambda dataset: marked(dataset, units))
     with writing(WHERE, "folder", folder):
-        further = [
-            StudyFigure(path.replace("/", "_"), path, "", each) for path, each in (figures or {}).items()
-        ]
-        return _draw_all(tree, Path(folder), (*FIGURES, *further), progress, formats)
+        return _draw_all(tree, Path(folder), (*FIGURES, *_path_figures(tree)), progress, formats)
 
 
-def _are_drawings(value: Any) -> bool:
-    return isinstance(value, Mapping) and all(map(callable, value.values()))
+def _path_figures(tree: xr.DataTree) -> Iterator[StudyFigure]:
+    """Yield the figures along the path of load or shear that the results state in an attribute."""
+    for node in tree.descendants:
+        names = str(node.attrs.get("path_figure", "")).split()
+        if names and not {"step", "shear"}.isdisjoint(node.dims):
+            group = node.path.strip("/")
+            draw_path = functools.partial(path, variable=names)
+            yield StudyFigure(group.replace("/", "_"), group, names[0], draw_path)
 
 
 def _draw_all(

@@ -19,7 +19,7 @@ from fractalcontact.scenes._result_tables import (
     plain,
     rows,
 )
-from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, along_path
+from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType
 
 
 def _set(title: str, *columns: Column, remarks: Remarks = no_remarks) -> Rows:
@@ -184,7 +184,6 @@ STAGES = (
             Column("contacts cross", _crosses),
             Column("largest share", "largest_share"),
         ),
-        figure=along_path("largest_share", "coverage"),
     ),
     _domain("hausdorff_content"),
     _domain(

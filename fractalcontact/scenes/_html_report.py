@@ -33,7 +33,6 @@ from fractalcontact.scenes._export import tables
 from fractalcontact.scenes._result_tables import SCAN, spread, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, pictured
 from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page_of
-from fractalcontact.scenes._stages import OWN_FIGURES
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -123,7 +122,7 @@ def report(
         if files is None:
             from fractalcontact import plotting  # only here: `run` has drawn them
 
-            files = plotting.draw(pictured(tree), folder, figures=OWN_FIGURES)
+            files = plotting.draw(pictured(tree), folder)
         with pictures_of(files) as pictures:
             return write_report(tree, target, pictures, summary_of(tree))
 

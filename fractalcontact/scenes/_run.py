@@ -35,7 +35,7 @@ from fractalcontact.scenes._results_folder import SCANS, PartStore, with_seeds
 from fractalcontact.scenes._scans import ScanStudies
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._scene_file import scans_of
-from fractalcontact.scenes._stages import FIGURES, OWN_FIGURES, check_memory, stages_of
+from fractalcontact.scenes._stages import FIGURES, check_memory, stages_of
 from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
 from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._validation import implausible_result, validated, warn_of
@@ -310,7 +310,7 @@ def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:
     from fractalcontact import plotting
 
     start = time.perf_counter()
-    files = plotting.draw(tree, folder, progress=progress, figures=OWN_FIGURES)
+    files = plotting.draw(tree, folder, progress=progress)
     entry = provenance_of(tree)
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)

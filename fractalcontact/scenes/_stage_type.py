@@ -1,7 +1,7 @@
 """What a stage of a study is: one entry that states all of it, by the public function that computes it.
 
 The stages are declared in `_surface_stages`, `_joint_stages` and `_domain_stages`: what each needs, its maps,
-its table, its figure and its caveats. `_stages` has all of them.
+its table and its caveats. `_stages` has all of them.
 """
 
 from __future__ import annotations
@@ -89,8 +89,6 @@ class StageType:
         run anywhere; "step" is the path of the load, cut into sections.
     rows : Rows, optional
         The table of its result in the summary and the report.
-    figure : function, optional
-        A figure of its result, beside those that `plotting.draw` knows of: of the Dataset, returns Axes.
     caveats : function, optional
         Yields what limits the result, and what it does to the numbers: of the study and the Dataset.
     whole_path : bool
@@ -123,7 +121,6 @@ class StageType:
     keeps: tuple[str, ...] = ()
     splits: tuple[str, ...] = ()
     rows: Rows | None = None
-    figure: Callable[[xr.Dataset], Any] | None = None
     caveats: Callable[[xr.DataTree, xr.Dataset], Iterator[str]] | None = None
     whole_path: bool = False
     presses: bool = False
@@ -160,14 +157,3 @@ class StageType:
         without_default = arguments_of(self.function)[1]
         known = self.keys or parameters_of(self.function)
         return (*self.required, *(key for key in known if key in without_default))
-
-
-def along_path(*variables: str, **options: Any) -> Callable[[xr.Dataset], Any]:
-    """Return the figure of variables along the path of load or shear, as `plotting.path` draws it."""
-
-    def draw(data: xr.Dataset) -> Any:
-        from fractalcontact import plotting  # only where figures are wanted
-
-        return plotting.path(data, variables, **options)
-
-    return draw

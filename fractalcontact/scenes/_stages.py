@@ -47,7 +47,6 @@ _ROWS = (
     StageType(FIGURES, (), "plotting.draw", takes="study"),
 )
 STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}
-OWN_FIGURES = {row.name: row.figure for row in _ROWS if row.figure is not None}
 # the words of [want]; those of its `dimensions` are the names of the estimators
 WANTED: Mapping[str, tuple[str, ...]] = {
     name: tuple(word for table, _, word in (row.wanted.partition(".") for row in _ROWS) if table == name)

@@ -80,18 +80,15 @@ def test_study_without_a_joint(study, tmp_path):
     assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area"]
 
 
-def test_figure_of_ones_own(study, tmp_path):
-    lacunarity = part(study, "domains/lacunarity")
-
-    def draw(data):
-        assert set(data) == set(lacunarity["domains/lacunarity"].data_vars)
-        return plotting.path(data.isel(box_size=0), "lacunarity")
-
-    figures = {"domains/lacunarity": draw, "domains/islands": draw}  # there are no islands
-    drawn = plotting.draw(lacunarity, tmp_path, figures=figures)
-    assert names(drawn) == ["lacunarity", "lacunarity_maps", "domains_lacunarity"]
-    with pytest.raises(InvalidInput, match="figures: expected a mapping of paths of groups to functions"):
-        plotting.draw(lacunarity, tmp_path, figures={"domains/lacunarity": "lacunarity"})
+def test_figure_along_the_path_that_a_result_states(study, tmp_path):
+    states = study["joints/closure"].to_dataset()["state"]
+    percolation = fc.domains.percolation(states)
+    assert percolation.attrs["path_figure"] == "largest_share coverage"
+    tree = xr.DataTree.from_dict({"/domains/percolation": percolation})
+    tree.to_netcdf(tmp_path / "result.nc")
+    assert names(plotting.draw(fc.open(tmp_path / "result.nc"), tmp_path)) == ["domains_percolation"]
+    of_one_state = xr.DataTree.from_dict({"/domains/percolation": fc.domains.percolation(states[0, 0])})
+    assert plotting.draw(of_one_state, tmp_path) == []
 
 
 def test_closure_without_maps(study, tmp_path):
