@@ -11,11 +11,10 @@ imported where it is called: a study of rigid faces loads neither it nor the com
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -32,9 +31,10 @@ from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights
 
 if TYPE_CHECKING:
-    from fractalcontact.contact.solver import ContactOptions, LoadPath, Sheared, ShearPath
+    from fractalcontact.contact.solver import ContactOptions, LoadPath, Pressed, Sheared, ShearPath
 
 Columns = dict[str, Array]
+T = TypeVar("T", "Pressed", "Sheared")
 
 # how the faces of the flat block are loaded, and what that makes of the bulk part of the closure
 BULK = {
@@ -176,10 +176,7 @@ class ShearedContact:
         from fractalcontact.contact import solver
 
         pressing = self.pressing
-        with self._problems_named(load):
-            pressed = solver.solve(
-                self.heights, pressing.grid, pressing.modulus, pressing.options, load, keep=keep
-            )
+        pressed = self._solve(solver.solve, load, keep=keep)
         columns = pressed.columns | pressed.maps
         columns |= {"rms_slope": np.array(self.rms_slope), "solver": np.array(pressed.solvers)}
         # the mean displacement of a periodic body is a rigid motion: no bulk part, also for a force of NaN
@@ -191,23 +188,18 @@ class ShearedContact:
         """Press by the load, and push the block along a path of tangential force."""
         from fractalcontact.contact import solver
 
-        pressing = self.pressing
-        problem = (pressing.grid, pressing.modulus, pressing.options, pressing.load)
-        with self._problems_named(pressing.load):
-            return solver.solve_shear(self.heights, *problem, path, keep=keep)
+        return self._solve(solver.solve_shear, self.pressing.load, path, keep=keep)
 
-    @contextmanager
-    def _problems_named(self, load: LoadPath) -> Iterator[None]:
-        """Check that a load is in proportion to the heights; name the caller and the shear in every error."""
-        from fractalcontact.contact import solver
+    def _solve(self, solve: Callable[..., T], load: LoadPath, *path: ShearPath, keep: Sequence[str]) -> T:
+        """Check that a load is in proportion to the heights, and solve; an error names caller and shear."""
+        from fractalcontact.contact.solver import check_scale
 
         pressing, height_range = self.pressing, float(np.ptp(self.heights))
+        problem = pressing.modulus, pressing.options, load
         try:
             with Problems(pressing.where) as problems:
-                solver.check_scale(
-                    problems, pressing.grid, height_range, pressing.modulus, pressing.options, load
-                )
-            yield
+                check_scale(problems, pressing.grid, height_range, *problem)
+            return solve(self.heights, pressing.grid, *problem, *path, keep=keep)
         except InvalidInput as error:
             lines = [f"{line} ({self.place})" for line in error.problems]
             raise InvalidInput(pressing.where, lines) from error

@@ -257,3 +257,8 @@ def test_provenance_names_the_solver_of_the_steps():
     assert provenance_of(dense)["solver"] == "closed_form (2 steps), elimination (2 steps)"
     opened = fc.joints.dilatancy(crack, direction="E", pressed=pressed, **loads)
     assert provenance_of(opened)["solver"] == "as pressed (4 steps)"
+
+
+def test_a_load_out_of_proportion_names_the_shear(crack):
+    with pytest.raises(ValueError, match=r"(?s)joints\.closure.*normal_force.*at a shear of 0 m towards N"):
+        fc.joints.closure(crack, shear=0.0, direction="N", normal_force=1e200)
