@@ -260,5 +260,5 @@ def test_provenance_names_the_solver_of_the_steps():
 
 
 def test_a_load_out_of_proportion_names_the_shear(crack):
-    with pytest.raises(ValueError, match=r"(?s)joints\.closure.*a double can hold.*at a shear of 0 m towards N"):
+    with pytest.raises(ValueError, match=r"(?s)joints\.closure.*a double.*at a shear of 0 m towards N"):
         fc.joints.closure(crack, shear=0.0, direction="N", normal_force=1e200)
