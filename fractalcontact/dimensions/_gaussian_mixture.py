@@ -208,12 +208,14 @@ class Bins:
         Before the spreads stands the second one: the power is even in the spread.
         """
         spread = self.nodes[0] * np.sinh(self.nodes[1] * np.arange(self.tables.shape[1]))[:, None]
-        hurst = 1.0 / (1.0 + np.exp(-_LOGITS * np.ones_like(spread)))
+        hurst = 1.0 / (1.0 + np.exp(-_LOGITS))
         # where a blur leaves nothing, a slope that no surface has
         least = 1e-200 * np.exp(-40.0 * self.lnq)
         logs = np.empty((len(self.tables), len(spread) + 1, _LOGITS.size, self.lnq.size))
         for form, table in enumerate(self.tables):
-            weight = weights(hurst, self.t, form, self.axes, spread * np.ones_like(hurst))
+            # only the weights of a surface that was blurred before it was sampled depend on the spread
+            h, s = np.broadcast_arrays(hurst, spread if form == ALIASED else 0.0)
+            weight = weights(h, self.t, form, self.axes, s)
             logs[form, 1:] = np.log(weight @ table.transpose(0, 2, 1) + least)
         logs[:, 0] = logs[:, 2]
         return logs
