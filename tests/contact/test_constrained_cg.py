@@ -5,7 +5,6 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
-from fractalcontact.contact import _window_solver
 from fractalcontact.contact._kernels import projected_step_sums
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet
 from fractalcontact.contact._problem import Body
@@ -99,12 +98,14 @@ def test_open_surroundings_do_not_matter(control):
     np.testing.assert_allclose(around["gap"].isel(inside), cut["gap"], atol=1e-18)
 
 
-def test_single_precision_start_same_solution(monkeypatch):
-    surface = rough(128)
-    double = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
-    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 0)
-    mixed = press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12)
-    np.testing.assert_array_equal(mixed["state"], double["state"])
+def test_single_precision_start_same_solution():
+    """From 512 x 512 points on a solution starts in single precision; four by four tiles are as one."""
+    tile = rough(128)
+    plane = fc.surfaces.from_array(np.tile(tile.values, (4, 4)), 1e-4, periodic=True)
+    double, mixed = (
+        press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12) for surface in (tile, plane)
+    )
+    np.testing.assert_array_equal(mixed["state"], np.tile(double["state"], (1, 4, 4)))
     np.testing.assert_allclose(mixed["closure"], double["closure"], rtol=1e-12)
 
 
