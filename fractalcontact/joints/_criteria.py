@@ -67,6 +67,9 @@ BOUNDS = ARGUMENTS | {"aperture": POSITIVE, "compressive_strength": POSITIVE}
 # Shear strength
 
 LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
+# degree: JRC = 3.95 t^0.7 - 7.98 of the dip t = theta_max/(C+1) is 0, the smoothest of the standard profiles
+# (Tatone and Grasselli 2010); t is the mean dip where the law of the facets is exact
+SMALLEST_DIP = (7.98 / 3.95) ** (1 / 0.7)
 
 
 def check_quantities(problems: Problems, *required: str, **bounds: dict[str, Any]) -> None:
@@ -191,7 +194,7 @@ def ladanyi_archambault(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     material = joint.wall_strength * (math.sqrt(1.0 + ratio) - 1.0) / ratio * np.sqrt(1.0 + ratio * relative)
     overridden = pressure * (1.0 - sheared) * (dilation + friction)
     strength = (overridden + sheared * material) / (1.0 - (1.0 - sheared) * dilation * friction)
-    return strength, relative <= 1.0
+    return strength, (relative <= 1.0) & (joint.asperity_angle >= SMALLEST_DIP)
 
 
 def barton_choubey(pressure: Array, joint: Joint) -> tuple[Array, Array]:
@@ -248,7 +251,8 @@ def xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
 
 def _by_facets(pressure: Array, joint: Joint) -> Array:
     """Return where a criterion of the facets may be used: rough, and sigma up to the tensile strength."""
-    return (pressure <= joint.tensile_strength) & (joint.area_fraction > 0)
+    dip = joint.theta_max / (joint.shape + 1.0)  # NaN where no facet faces the shear
+    return (pressure <= joint.tensile_strength) & (dip >= SMALLEST_DIP)
 
 
 class Criterion(NamedTuple):

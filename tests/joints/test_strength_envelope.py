@@ -251,6 +251,26 @@ def test_roughness_beyond_the_scale_is_out_of_range(make_face, rough):
     assert "in_range" in result.shear_strength.attrs["comment"]
 
 
+@pytest.mark.parametrize(("dip", "inside"), [(2.6, False), (2.9, True)])
+@pytest.mark.parametrize("criterion", ["ladanyi_archambault", "grasselli_egger", "xia"])
+def test_asperities_less_steep_than_those_of_the_standard_profiles_are_out_of_range(
+    make_face, criterion, dip, inside
+):
+    """The regression of Tatone and Grasselli (2010) has JRC = 0 at 2.73 degrees, a mean dip of facets."""
+    x = np.arange(401) % 20
+    teeth = make_face(np.minimum(x, 20 - x) * np.tan(np.radians(dip)) * np.ones((5, 1)) * S, S)
+    _, found = strength(teeth, criterion, [1.0], residual_friction_angle=30)
+    assert found.tolist() == [inside]
+
+
+def test_only_the_criterion_that_is_that_of_a_plane_is_in_range_on_a_nanometre_of_roughness(make_face, rough):
+    smooth = make_face(1e-9 * rough((40, 40), 5), S)
+    everything = fc.joints.strength_envelope(
+        smooth, **NEEDED, cohesion=MPA, length=1.0, residual_friction_angle=30
+    )
+    assert everything.criterion.where(everything.in_range[:, 0], drop=True).values.tolist() == ["patton"]
+
+
 def test_a_plane_has_the_basic_strength(make_face):
     plane = make_face(np.zeros((30, 30)), S)
     found, inside = strength(plane, ["barton_choubey"], [1.0, 5.0])
