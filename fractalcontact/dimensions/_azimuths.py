@@ -232,19 +232,25 @@ class Classes:
         """Return the weighted mean in each ring; 0 without a weight."""
         return _means(self.ring, values, weight)
 
-    def excess(self, spectrum: MetricSpectrum) -> Array:
-        """Return the level over the mean of the ring, less one."""
-        ratio = self.level / np.maximum(self.relative(spectrum), 1e-300)
+    def excess(self, relative: Array) -> Array:
+        """Return the level over a power, `relative` to that expected, over the mean of the ring, less one."""
+        ratio = self.level / np.maximum(relative, 1e-300)
         return np.asarray(ratio / self.by_ring(ratio, self.count)[self.ring] - 1.0)
 
     def centred(self, columns: list[Array]) -> Array:
         """Return columns less the mean of their ring, shape (classes, columns)."""
         return np.stack([c - self.by_ring(c, self.count)[self.ring] for c in columns], axis=1)
 
-    def metric_columns(self, spectrum: MetricSpectrum, uv: Array, step: float = 1e-4) -> list[Array]:
-        """Return the derivatives of the logarithms with respect to the components of the log ratio."""
+    def metric_columns(
+        self, spectrum: MetricSpectrum, uv: Array, relative: Array, step: float = 1e-4
+    ) -> list[Array]:
+        """Return the derivatives of the logarithms with respect to the components of the log ratio.
+
+        `relative`: power of the spectrum.
+        """
         moved = [replace(spectrum, metric=metric_of(*(uv + move))) for move in np.eye(2) * step]
-        here, *there = (np.log(np.maximum(self.relative(each), 1e-300)) for each in (spectrum, *moved))
+        powers = relative, *(self.relative(each) for each in moved)
+        here, *there = (np.log(np.maximum(power, 1e-300)) for power in powers)
         return [(each - here) / step for each in there]
 
     def fit_metric(self, spectrum: MetricSpectrum, uv: Array) -> tuple[Array, Array, float]:
@@ -255,14 +261,15 @@ class Classes:
         weight = self.count * self.information
         for _ in range(_ROUNDS):
             spectrum = replace(spectrum, metric=metric_of(*uv))
-            columns = self.centred(self.metric_columns(spectrum, uv))
+            relative = self.relative(spectrum)
+            columns = self.centred(self.metric_columns(spectrum, uv, relative))
             covariance = np.linalg.pinv((weight[:, None] * columns).T @ columns)
-            step = covariance @ (columns.T @ (weight * self.excess(spectrum)))
+            step = covariance @ (columns.T @ (weight * self.excess(relative)))
             uv = uv + step / max(1.0, math.hypot(*step))
             uv = uv / max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)
             if math.hypot(*step) < 0.01:
                 break
-        excess = self.excess(replace(spectrum, metric=metric_of(*uv)))
+        excess = self.excess(self.relative(replace(spectrum, metric=metric_of(*uv))))
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
         return uv, covariance, float(deviance)
 
@@ -350,12 +357,13 @@ class Classes:
         azimuth = np.arctan2(across, lower[1, 1] * np.cos(azimuth))
         waves = [wave(order * azimuth) for order in (2, 4) for wave in (np.cos, np.sin)]
         columns = [*waves, *(self.lnq * wave for wave in waves)]
+        relative = self.relative(spectrum)
         if uv is not None:
-            columns[:2] = self.metric_columns(spectrum, uv)
+            columns[:2] = self.metric_columns(spectrum, uv, relative)
         length = 2.0 * np.pi / np.exp(self.by_ring(self.lnq, self.count)) / max(1.0, self.modes.dy)
         weight = self.count * self.information * (length > shortest)[self.ring]
         centred = self.centred(columns)
-        score = centred.T @ (weight * self.excess(spectrum))
+        score = centred.T @ (weight * self.excess(relative))
         covariance = (weight[:, None] * centred).T @ centred
         if fitted:
             projection = covariance[fitted:, :fitted] @ np.linalg.pinv(covariance[:fitted, :fitted])
