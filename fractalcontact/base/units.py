@@ -105,7 +105,12 @@ def named_scale(units: str, shown: str) -> Scale | None:
     --------
     >>> named_scale("m", "mm"), named_scale("m2", "mm2"), named_scale("1", "%"), named_scale("m", "N")
     (Scale(factor=0.001, unit='mm'), Scale(factor=1e-06, unit='mm²'), Scale(factor=0.01, unit='%'), None)
+    >>> named_scale("Pa m-1", "MPa/mm")
+    Scale(factor=1000000000.0, unit='MPa/mm')
     """
+    if "/" in shown and (quotient := re.fullmatch(r"(\S+) (\S+)-1", units)):
+        over, per = map(named_scale, quotient.groups(), shown.split("/", 1))
+        return Scale(over.factor / per.factor, f"{over.unit}/{per.unit}") if over and per else None
     if units in ("", "1"):
         return {"": Scale(1.0, ""), "1": Scale(1.0, ""), "%": Scale(0.01, "%")}.get(shown)
     unit, wanted = raise_exponents(units), raise_exponents(shown).replace("u", "µ", int(shown[:1] == "u"))

@@ -75,6 +75,21 @@ def test_units_of_an_array_with_scalars_beside_it(study):
         plotting.field(pressure, units={"height": "mm"})
 
 
+@pytest.mark.parametrize(
+    ("unit", "largest"),
+    [("MPa/mm", 20.0), ("GPa/m", 20.0), ("kPa/um", 20.0), ("Pa/m", 2e10), ("Pa m-1", 2e10)],
+)
+def test_unit_of_a_stiffness_is_a_quotient(unit, largest):
+    values = {"stiffness": ("step", [1e10, 2e10], {"units": "Pa m-1"}), "closure": ("step", [1e-6, 2e-6])}
+    path = xr.Dataset(values)
+    ax = plotting.path(path, "stiffness", units={"stiffness": unit})
+    assert ax.lines[0].get_ydata()[-1] == pytest.approx(largest, rel=1e-12)
+    with pytest.raises(
+        InvalidInput, match=r"units\['stiffness'\]: expected Pa m-1, with a prefix, got 'N/mm'"
+    ):
+        plotting.path(path, "stiffness", units={"stiffness": "N/mm"})
+
+
 def test_percent_or_fraction(study):
     data = study["joints/closure"].to_dataset()
     percent, fraction = (plotting.contact_area(data, units={"contact_fraction": unit}) for unit in "%1")
