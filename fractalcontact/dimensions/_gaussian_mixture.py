@@ -280,7 +280,7 @@ class Bins:
 
 def _cubic(place: Array, size: int) -> tuple[Array, Array, Array]:
     """Return the first of four nodes about each place, and the shares of their values and slopes there."""
-    first = np.clip(place.astype(np.int64) - 1, 0, size - 4)
+    first = np.minimum(np.maximum(place.astype(np.int64) - 1, 0), size - 4)
     powers = (place - first - 1.0)[:, None] ** np.arange(4)
     return first, powers @ _CUBICS, (powers[:, :3] * np.arange(1.0, 4.0)) @ _CUBICS[1:]
 

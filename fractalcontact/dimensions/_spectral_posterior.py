@@ -458,6 +458,7 @@ def _maxima(
         Of the numerical derivative of theta.
     """
     shape, identity = start.shape, np.eye(start.shape[2])
+    steps = step * np.concatenate([np.zeros((1, start.shape[2])), identity])
     form, fixed = form.repeat(shape[1]), fixed.repeat(shape[1], axis=0)
     start, kind = start.reshape(-1, shape[2]), np.tile(np.arange(shape[1]), shape[0])
     u, objective = start.copy(), np.full(len(start), np.inf)
@@ -465,10 +466,10 @@ def _maxima(
     damping, rejected = np.zeros(len(start)), np.zeros(len(start), dtype=np.int64)
     active, trial = np.arange(len(start)), start
     for _ in range(evaluations):
-        theta = _theta(trial, fixed[active], prior)
-        moved = _theta(trial[:, None] + step * identity, fixed[active][:, None], prior)
+        points = _theta(trial[:, None] + steps, fixed[active][:, None], prior)
+        theta = points[:, 0]
         model, slopes = bins.log_power(theta, form[active], slopes=True)
-        change = (moved - theta[:, None]) / step
+        change = (points[:, 1:] - points[:, :1]) / step
         change[..., CORNER] /= np.maximum(theta[:, CORNER], 1e-300)[:, None]
         rows = np.concatenate([(bins.level - model)[:, None], change @ slopes], axis=1)
         rows = rows @ whitening[kind[active]].transpose(0, 2, 1)
