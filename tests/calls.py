@@ -229,7 +229,6 @@ CALLS = {
     "plotting.friction": lambda: {"result": result_of("joints.friction"), "direction": "E"},
     "plotting.first_contact": lambda: {"result": pressed()},
     "plotting.alluvial": lambda: {"result": result_of("domains.lineage")},
-    "plotting.lineage": lambda: {"result": result_of("domains.evolution")},
     "plotting.hydraulic_aperture": lambda: {"result": result_of("joints.transmissivity")},
     "plotting.uplift": lambda: {"result": watered()},
     "plotting.dimensions": lambda: {"estimates": estimates()},

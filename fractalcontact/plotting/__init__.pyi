@@ -20,8 +20,8 @@ from ._fields import field as field
 from ._fields import first_contact as first_contact
 from ._fields import surface as surface
 from ._islands import alluvial as alluvial
+from ._islands import evolution as evolution
 from ._islands import islands as islands
-from ._islands import lineage as lineage
 from ._size_curves import box_dimension as box_dimension
 from ._size_curves import lacunarity as lacunarity
 from ._size_curves import signature as signature
@@ -50,13 +50,13 @@ __all__ = [
     "dilatancy",
     "error_against_time",
     "estimator_errors",
+    "evolution",
     "field",
     "first_contact",
     "friction",
     "hydraulic_aperture",
     "islands",
     "lacunarity",
-    "lineage",
     "path",
     "pressure_distribution",
     "scaling",

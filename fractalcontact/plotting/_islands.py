@@ -111,7 +111,7 @@ def _masks_of(data: xr.Dataset) -> tuple[Family, list[Any]]:
 
 
 @figure
-def lineage(
+def evolution(
     result: Any, *, against: str | None = None, units: Units | None = None, axes: Panels | None = None
 ) -> AxesArray:
     """Draw the number of islands along a path, beside the islands that are born and those that are absorbed.
@@ -131,7 +131,7 @@ def lineage(
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> loads = [1e5, 1e6, 1e7]
     >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=loads, keep=("state",))
-    >>> left, right = fc.plotting.lineage(fc.domains.evolution(pressed["state"]))
+    >>> left, right = fc.plotting.evolution(fc.domains.evolution(pressed["state"]))
     >>> print(left.get_ylabel(), "|", right.get_ylabel())
     number of islands | islands in a step
     """
@@ -312,6 +312,6 @@ def _stacked(island: Array, order: Array, width: Array) -> Array:
 
 FIGURES = (
     StudyFigure("islands", "domains/islands", "label", islands),
-    StudyFigure("lineage", "domains/evolution", "births", lineage),
+    StudyFigure("evolution", "domains/evolution", "births", evolution),
     StudyFigure("alluvial", "domains/lineage", "common_cells", alluvial),
 )

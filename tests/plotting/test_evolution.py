@@ -63,7 +63,7 @@ def test_lineage_and_the_coalescence_load():
     coords = {"shear": [1e-4, 2e-4], "step": np.arange(4), "normal_force": ("step", loads)}
     result = xr.Dataset(data, coords)
     result["shear"].attrs["units"], result["normal_force"].attrs["units"] = "m", "N"
-    left, right = plotting.lineage(result)
+    left, right = plotting.evolution(result)
     for ax, names in ((left, ["n_islands"]), (right, ["births", "absorbed"])):
         for name in names:
             for v in range(2):
@@ -71,13 +71,13 @@ def test_lineage_and_the_coalescence_load():
                 assert holds(curves, loads, result[name][v])
     marks = [line.get_xdata()[0] for line in right.lines if line.get_linestyle() == ":"]
     assert marks == [4.0, 4.0]  # the first load at which more islands are absorbed than born
-    along_shear = plotting.lineage(result.isel(step=[1]), against="shear")
+    along_shear = plotting.evolution(result.isel(step=[1]), against="shear")
     assert along_shear[0].get_xlabel().startswith("shear displacement")
-    growing = plotting.lineage(result.isel(step=[0, 1]))[1]
+    growing = plotting.evolution(result.isel(step=[0, 1]))[1]
     assert not [line for line in growing.lines if line.get_linestyle() == ":"]
     render(left)
     with pytest.raises(InvalidInput, match="births"):
-        plotting.lineage(result.drop_vars("births"))
+        plotting.evolution(result.drop_vars("births"))
 
 
 def test_alluvial_bars_are_islands_and_ribbons_what_they_share():
@@ -205,7 +205,7 @@ def test_a_study_draws_its_evolution(measured, tmp_path):
         "/domains/lacunarity": fc.domains.lacunarity(path.state),
     }
     names = {file.stem for file in plotting.draw(xr.DataTree.from_dict(groups), tmp_path)}
-    assert {"first_contact", "signature", "lineage", "lacunarity", "lacunarity_maps"} <= names
+    assert {"first_contact", "signature", "evolution", "lacunarity", "lacunarity_maps"} <= names
 
 
 def test_units_of_an_evolution(measured):

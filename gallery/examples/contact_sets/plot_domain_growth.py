@@ -32,7 +32,7 @@ first = fc.plotting.first_contact(pressed)
 
 evolution = fc.domains.evolution(pressed["state"])
 print(evolution)
-counts = fc.plotting.lineage(evolution)
+counts = fc.plotting.evolution(evolution)
 
 # %%
 # Which islands grow together: each of the 20 largest islands of the last load has a colour, and so have all
