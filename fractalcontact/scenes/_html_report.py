@@ -14,8 +14,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -34,6 +35,9 @@ from fractalcontact.scenes._result_tables import SCAN, spread, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, pictured
 from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page_of
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -178,16 +182,12 @@ def _page(
     target: Path,
 ) -> str:
     """Return the text of the page."""
-    from jinja2 import Environment  # here: a study without a folder has no report
-
-    template = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
     pages = {name: page for name in _scans(tree) if (target.parent / (page := page_of(name))).is_file()}
     entry = provenance_of(tree)
     scene = scene_of(tree)
     written = str(tree.attrs.get("history", "")).split(" ")[0]
     subtitle = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string(template.read_text(encoding="utf-8")).render(
+    return _template().render(
         title=summary.title,
         subtitle=" · ".join(str(part) for part in subtitle if part),
         generator=str(tree.attrs.get("source", "fractalcontact")),
@@ -204,6 +204,16 @@ def _page(
         references=str(tree.attrs.get("references", "")),
         **contents,
     )
+
+
+@cache
+def _template() -> Template:
+    """Return the template of the page, which takes longer to compile than to render: a page for each scan."""
+    from jinja2 import Environment  # here: a study without a folder has no report
+
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    file = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
+    return environment.from_string(file.read_text(encoding="utf-8"))
 
 
 def _scans(tree: xr.DataTree) -> list[str]:

@@ -10,6 +10,7 @@ import importlib
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from fractalcontact.scenes._result_tables import Rows
@@ -49,6 +50,7 @@ def parameters_of(function: str) -> dict[str, inspect.Parameter]:
     return dict(inspect.signature(public_function(function)).parameters)
 
 
+@cache
 def arguments_of(function: str) -> tuple[tuple[str, ...], frozenset[str]]:
     """Return the arguments of a public function that a scene may give, and those without a default."""
     known = {key: value for key, value in parameters_of(function).items() if key not in FROM_SCENE}

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from fractalcontact.scenes._scene import OF_SURFACE
 
 if TYPE_CHECKING:
     import xarray as xr
+    from jinja2 import Template
 
 Files = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
@@ -164,12 +166,17 @@ def template(
 
 def _scene(**values: Any) -> str:
     """Return the text of a scene."""
+    return _question_template().render(values)
+
+
+@cache
+def _question_template() -> Template:
     from jinja2 import Environment  # only here and for the report
 
-    template = importlib.resources.files("fractalcontact.scenes").joinpath("question.toml.jinja")
     environment = Environment(trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
     environment.filters["toml"] = _toml
-    return environment.from_string(template.read_text(encoding="utf-8")).render(values)
+    file = importlib.resources.files("fractalcontact.scenes").joinpath("question.toml.jinja")
+    return environment.from_string(file.read_text(encoding="utf-8"))
 
 
 def _files(scan: Files) -> list[Path]:
