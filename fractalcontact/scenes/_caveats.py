@@ -42,9 +42,8 @@ def caveats(tree: xr.DataTree) -> list[str]:
         return []
     sentences = [sentence for rule in RULES for sentence in rule(tree)]
     for name, stage in STAGES.items():
-        data = group_of(tree, name) if stage.caveats is not None else None
-        if stage.caveats is not None and data is not None:
-            sentences += stage.caveats(tree, data)
+        if (data := group_of(tree, name)) is not None:
+            sentences += (f"{name}: {text}" for text in stage.caveats(tree, data))
     return sentences
 
 

@@ -11,9 +11,8 @@ from fractalcontact.base.study import group_of, of_member
 from fractalcontact.base.tables import table
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._caveats import caveats
-from fractalcontact.scenes._result_tables import ResultTable, table_of
-from fractalcontact.scenes._stages import STAGES
-from fractalcontact.scenes._summary import written_rows
+from fractalcontact.scenes._result_tables import ResultTable
+from fractalcontact.scenes._summary import stage_tables, written_rows
 
 # by group, columns of the table that its stage declares
 SHOWN = {
@@ -83,7 +82,4 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
 def _tables(study: xr.DataTree, most: int = 4) -> Iterator[ResultTable]:
     """Yield the tables of the page with the columns that it shows, and at most so many rows."""
     for name, columns in SHOWN.items():
-        data, rows = group_of(study, name), STAGES[name].rows
-        made = table_of(rows, study, data) if data is not None and rows is not None else None
-        if made is not None:
-            yield made.selected(columns).shortened(most)
+        yield from (made.selected(columns).shortened(most) for made in stage_tables(study, [name]))

@@ -265,37 +265,32 @@ def _limits_of_uplift(_: xr.DataTree, water: xr.Dataset) -> Iterator[str]:
     forces = water["uplift_force"]
     with np.errstate(divide="ignore", invalid="ignore"):
         more = forces.sel(diagram="joint") / forces.drop_sel(diagram="joint") - 1.0
-    more = more.where(np.isfinite(more))
-    if float(more.max()) > 0:
+    largest = float(more.where(np.isfinite(more)).max())
+    if largest > 0:
         yield (
-            f"joints/uplift: the diagrams are NOT on the safe side: the joint has up to "
-            f"{100 * float(more.max()):.1f} % more uplift."
+            f"the diagrams are NOT on the safe side: the joint has up to {100 * largest:.1f} % more uplift."
         )
     isolated = float(water["isolated_fraction"].max())
     if isolated > 0.05:  # less is lost in the pressure beside it
         yield (
-            f"joints/uplift: up to {100 * isolated:.0f} % of the area is open but closed off from the water; "
-            "over time it may come there too, and the uplift grow."
+            f"up to {100 * isolated:.0f} % of the area is open but closed off from the water; over time it "
+            "may come there too, and the uplift grow."
         )
     failed = ~water["converged"]
     if not bool(failed.any()):
         return
-    count = f"{int(failed.sum())} of {failed.size}"
     if "balance_error" not in water:
-        yield f"joints/uplift: {water['converged'].attrs['reason']} in {count} cases."
+        yield f"{water['converged'].attrs['reason']} in {int(failed.sum())} of {failed.size} cases."
         return
     errors = water["balance_error"].where(failed)
-    if float(errors.min()) < 0:
-        yield (
-            f"joints/uplift: in {int((errors < 0).sum())} of {failed.size} cases the load path of the "
-            "closure ends before the effective stress; give it greater loads."
-        )
-    if float(errors.max()) > 0:
-        yield (
-            f"joints/uplift: in {int((errors > 0).sum())} of {failed.size} cases the water carries more "
-            "than the total stress less the lowest load of the closure: it lifts the joint, or the path "
-            "starts too late."
-        )
+    reasons = (
+        "the load path of the closure ends before the effective stress; give it greater loads.",
+        "the water carries more than the total stress less the lowest load of the closure: it lifts the "
+        "joint, or the path starts too late.",
+    )
+    for cases, reason in zip((errors < 0, errors > 0), reasons, strict=True):
+        if cases.any():
+            yield f"in {int(cases.sum())} of {failed.size} cases {reason}"
 
 
 def _normal_stress(state: xr.Dataset) -> Any:

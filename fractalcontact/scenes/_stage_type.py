@@ -8,34 +8,20 @@ from __future__ import annotations
 
 import importlib
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from fractalcontact.scenes._result_tables import Rows
-
-if TYPE_CHECKING:
-    import xarray as xr
+from fractalcontact.scenes._result_tables import Remarks, Rows, no_remarks
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
 PARTIAL_SLIP = "partial_slip"
 # arguments that a scene states elsewhere: surfaces, maps, what to keep, progress bars
-FROM_SCENE = frozenset(
-    (
-        "surface",
-        "crack",
-        "pressed",
-        "signature",
-        "mask",
-        "valid",
-        "gap",
-        "dilatancy",
-        "keep",
-        "progress",
-    )
-)
+FROM_SCENE = frozenset((
+    "surface", "crack", "pressed", "signature", "mask", "valid", "gap", "dilatancy", "keep", "progress",
+))  # fmt: skip
 MATERIAL_ALONE = "basic_friction_angle"  # of bodies: no table of a stage gives one of its own
 
 
@@ -91,7 +77,7 @@ class StageType:
         run anywhere; "step" is the path of the load, cut into sections.
     rows : Rows, optional
         The table of its result in the summary and the report.
-    caveats : function, optional
+    caveats : function
         Yields what limits the result, and what it does to the numbers: of the study and the Dataset.
     whole_path : bool
         It follows the contact set along the load path, or measures all states over one window of lengths, and
@@ -123,7 +109,7 @@ class StageType:
     keeps: tuple[str, ...] = ()
     splits: tuple[str, ...] = ()
     rows: Rows | None = None
-    caveats: Callable[[xr.DataTree, xr.Dataset], Iterator[str]] | None = None
+    caveats: Remarks = no_remarks
     whole_path: bool = False
     presses: bool = False
     may_be_rigid: bool = False

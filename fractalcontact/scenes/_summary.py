@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,12 +98,16 @@ def _tables(tree: xr.DataTree, *, screen: bool) -> Iterator[ResultTable]:
     yield from of_scans
     if of_scans:  # each has a page of its own for the rest
         return
-    for name, stage in STAGES.items():
-        data = group_of(tree, name) if stage.rows is not None else None
-        if data is not None and stage.rows is not None:
-            made = table_of(stage.rows, tree, data, screen=screen)
-            if made is not None:
-                yield made
+    yield from stage_tables(tree, STAGES, screen=screen)
+
+
+def stage_tables(tree: xr.DataTree, names: Iterable[str], *, screen: bool = False) -> Iterator[ResultTable]:
+    """Yield the table of each of the stages that the study has a result of, or its columns for the screen."""
+    for name in names:
+        rows, data = STAGES[name].rows, group_of(tree, name)
+        made = None if rows is None or data is None else table_of(rows, tree, data, screen=screen)
+        if made is not None:
+            yield made
 
 
 def joined_tables(tables: Sequence[ResultTable]) -> list[ResultTable]:

@@ -102,6 +102,12 @@ SLIP_TABLE = rows(
 SURFACE = ("surfaces",)
 
 
+CURVES = (
+    "spectrum", "variogram", "cube_counts", "roughness_length", "variation", "higuchi",
+    "detrended_fluctuation", "divider", "covering",
+)  # fmt: skip
+
+
 def _curve(method: str) -> StageType:
     name = f"dimensions.{method}"
     return StageType(f"dimensions/{method}", SURFACE, name, wanted=name, for_figures=True)
@@ -140,15 +146,7 @@ STAGES = (
             remarks=_of_method,
         ),
     ),
-    _curve("spectrum"),
-    _curve("variogram"),
-    _curve("cube_counts"),
-    _curve("roughness_length"),
-    _curve("variation"),
-    _curve("higuchi"),
-    _curve("detrended_fluctuation"),
-    _curve("divider"),
-    _curve("covering"),
+    *map(_curve, CURVES),
     StageType(
         "contact",
         SURFACE,
