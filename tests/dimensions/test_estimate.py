@@ -232,7 +232,7 @@ def test_stack_equals_single_results():
     assert "member" in result.coords
 
 
-@pytest.mark.parametrize("hurst", [0.25, 0.75])
+@pytest.mark.parametrize("hurst", [0.25, pytest.param(0.75, marks=pytest.mark.slow)])
 def test_profiles(hurst):
     profile = fc.surfaces.fbm(900, 1e-4, hurst=hurst, rms_increment=1e-6, rng=31)
     result = estimate(profile, ["default", *NAMES])
@@ -354,7 +354,7 @@ def test_heights_whose_squares_overflow(rough, of_rough, factor):
             getattr(fc.dimensions, curve)(far)
 
 
-@pytest.mark.parametrize(("hurst", "noise"), [(0.9, 0.3), (0.3, 1.0)])
+@pytest.mark.parametrize(("hurst", "noise"), [(0.9, 0.3), pytest.param(0.3, 1.0, marks=pytest.mark.slow)])
 def test_known_noise_gives_a_narrower_interval_that_holds(hurst, noise):
     """The amplitude of the surface is unknown, that of the noise is not."""
     free, known = [], []

@@ -53,7 +53,7 @@ def test_smooth_and_tilted_heights_have_an_estimate_or_a_reason(heights, periodi
         assert 0 <= float(result.hurst[0]) <= 1
 
 
-@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("turned", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_ridges_are_no_isotropic_surface(turned):
     """A periodic ramp: all waves run along it, so that no ratio can be fitted."""
     ramp = x + 1e-8 * np.random.default_rng(1).standard_normal((151, 106))

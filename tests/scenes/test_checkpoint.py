@@ -119,7 +119,9 @@ def test_repeated_signal_within_half_a_second_counts_once(tmp_path):
     assert stop.number == signal.SIGTERM
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
+)
 def test_killed_study_leaves_no_incomplete_file(uninterrupted, tmp_path, number):
     process = Copy("run", uninterrupted[0], "-o", tmp_path, "--quiet")
     deadline = time.monotonic() + 60

@@ -156,7 +156,9 @@ def test_command_with_worker_processes_writes_the_same_bytes(uninterrupted, tmp_
     assert (watch / "seen").read_text().splitlines()[-1] == "1 1"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow), signal.SIGKILL]
+)
 def test_stopped_worker_processes_end_and_the_study_resumes(uninterrupted, tmp_path, number):
     process = Copy("run", uninterrupted[0], "-o", tmp_path, "--workers", 2)
     while not list(tmp_path.glob(".stages/*.npz")) and process.poll() is None:
