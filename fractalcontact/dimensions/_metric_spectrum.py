@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -109,29 +109,42 @@ class MetricSpectrum:
     @cached_property
     def _far_images(self) -> Array:
         """Coefficients of the sum over all images but the nearest, of products of Chebyshev polynomials."""
-        from scipy.special import gammaincc
-
         hurst = float(self.theta[HURST])
         spread = float(self.theta[SPREAD]) if self.form == ALIASED else 0.0
         inverse = np.linalg.inv(self.metric)
-        places = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-        down, across = (k.ravel() for k in np.mgrid[-_IMAGES : _IMAGES + 1, -_IMAGES : _IMAGES + 1])
-        far = np.maximum(abs(down), abs(across)) > 1
-        y = np.pi / self.dy * (places[:, None, None] + 2.0 * down[far])
-        x = np.pi * (places[:, None] + 2.0 * across[far])
-        images = squared_length(inverse, y, x) ** (-1.0 - hurst) * np.exp(-(spread**2) * (y * y + x * x))
-        # those beyond, as an integral over the outside of their rectangle
-        azimuth = np.pi / 180.0 * (np.arange(360) + 0.5)
-        sine, cosine = np.sin(azimuth), np.cos(azimuth)
-        edge = 2.0 * np.pi * (_IMAGES + 0.5) / np.maximum(np.abs(sine) * self.dy, np.abs(cosine))
-        z = np.square(spread * edge)
-        blurred = spread ** (2.0 * hurst) * gammaincc(1.0 - hurst, z) * math.gamma(1.0 - hurst)
+        (y, x, blur), (sine, cosine, radial), polynomials = _of_any_metric(hurst, spread, self.dy)
+        images = squared_length(inverse, y, x) ** (-1.0 - hurst) * blur
         by_azimuth = squared_length(inverse, sine, cosine) ** (-1.0 - hurst)
-        beyond = np.mean(by_azimuth * (edge ** (-2.0 * hurst) * np.exp(-z) - blurred))
-        beyond *= self.dy / (4.0 * np.pi * hurst)
-        polynomials = np.polynomial.chebyshev.chebvander(places, _NODES - 1) * (2.0 / _NODES)
-        polynomials[:, 0] *= 0.5
+        beyond = np.mean(by_azimuth * radial) * (self.dy / (4.0 * np.pi * hurst))
         return np.asarray(polynomials.T @ (images.sum(axis=2) + beyond) @ polynomials)
+
+
+@lru_cache(maxsize=4)  # a metric is fitted with one exponent and one spread
+def _of_any_metric(
+    hurst: float, spread: float, dy: float
+) -> tuple[tuple[Array, Array, Array], tuple[Array, Array, Array], Array]:
+    """Return what the sum over far images takes with any metric.
+
+    Wavenumbers of the images at the nodes of the interpolation and their blur; by azimuth, the sine, the
+    cosine, and the integral over those beyond; the polynomials at the nodes.
+    """
+    from scipy.special import gammaincc
+
+    places = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    down, across = (k.ravel() for k in np.mgrid[-_IMAGES : _IMAGES + 1, -_IMAGES : _IMAGES + 1])
+    far = np.maximum(abs(down), abs(across)) > 1
+    y = np.pi / dy * (places[:, None, None] + 2.0 * down[far])
+    x = np.pi * (places[:, None] + 2.0 * across[far])
+    blur = np.exp(-(spread**2) * (y * y + x * x))
+    # those beyond, as an integral over the outside of their rectangle
+    azimuth = np.pi / 180.0 * (np.arange(360) + 0.5)
+    sine, cosine = np.sin(azimuth), np.cos(azimuth)
+    edge = 2.0 * np.pi * (_IMAGES + 0.5) / np.maximum(np.abs(sine) * dy, np.abs(cosine))
+    z = np.square(spread * edge)
+    blurred = spread ** (2.0 * hurst) * gammaincc(1.0 - hurst, z) * math.gamma(1.0 - hurst)
+    polynomials = np.polynomial.chebyshev.chebvander(places, _NODES - 1) * (2.0 / _NODES)
+    polynomials[:, 0] *= 0.5
+    return (y, x, blur), (sine, cosine, edge ** (-2.0 * hurst) * np.exp(-z) - blurred), polynomials
 
 
 def gaussian_tables(
