@@ -134,10 +134,8 @@ SIGNATURE_TABLE = _set(
 
 def _domain(name: str, rows: Rows | None = None, needs: tuple[str, ...] = (), **more: Any) -> StageType:
     source = ("contact or joints/closure", *needs)
-    table, why = f"domains.{name}", "the contact set is analysed"
-    return StageType(
-        f"domains/{name}", source, table, table, table, "map", why, reads="state", rows=rows, **more
-    )
+    table = f"domains.{name}"
+    return StageType(f"domains/{name}", source, table, table, table, "map", reads="state", rows=rows, **more)
 
 
 STAGES = (

@@ -316,8 +316,7 @@ def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
 
 
 def _of_gap(name: str, **more: Any) -> StageType:
-    why = f"{name} needs the gap"
-    return _joint(name, needs=("joints/closure",), takes="map", reads="gap", why=why, **more)
+    return _joint(name, needs=("joints/closure",), takes="map", reads="gap", **more)
 
 
 _ONE: dict[str, Any] = {"one_load": True, "one_direction": True}
@@ -392,7 +391,6 @@ STAGES = (
         ),
         ("joints/closure",),
         takes="result",
-        why="closure_laws needs it",
         keys=("seating_pressure",),  # its closure is the result of another stage, not a load
     ),
     _joint(
@@ -463,7 +461,6 @@ STAGES = (
         ),
         ("joints/elastic_dilatancy or joints/rigid_dilatancy",),
         takes="result",
-        why="friction needs a dilatancy",
         own=("nominal_pressure",),  # in [joint] it is the load of the closure
     ),
     _of_surface(

@@ -64,8 +64,6 @@ class StageType:
     takes : {"surface", "crack", "map", "result", "file", "study"}
         The first argument of the function: the lower face, the crack, a map or the whole result of the stage
         it needs, a file of the scene, or all results.
-    why : str
-        Why it needs another stage, for the plan.
     for_figures : bool
         It is computed only where figures are wanted.
     reads : str
@@ -103,7 +101,6 @@ class StageType:
     table: str = ""
     wanted: str = ""
     takes: Literal["surface", "crack", "map", "result", "file", "study"] = "surface"
-    why: str = ""
     for_figures: bool = False
     reads: str = ""
     keeps: tuple[str, ...] = ()

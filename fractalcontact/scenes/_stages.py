@@ -237,7 +237,7 @@ def _reasons(scene: Scene) -> dict[str, str]:
         for need in row.needs[:1] if row.name in reasons and row.takes in ("map", "result") else ():
             *_, last = names = need.split(" or ")
             if reasons.keys().isdisjoint(names):
-                reasons[last] = row.why
+                reasons[last] = f"{row.word} needs it"
     if any(STAGES[name].group == "joints" for name in reasons):
         if want.figures and "shear" in values_of(scene, STAGES["joints/delta_surface"]):
             reasons.setdefault("joints/delta_surface", "figures are wanted")

@@ -70,8 +70,10 @@ def scene(folder, text):
 def test_wanted_result_plans_only_the_required_stages(tmp_path, word):
     study = scene(tmp_path, WORDS[word])
     named = "dimensions" if word.startswith("dimensions/") else resources.NAMED.get(word, word)
-    planned = {stage.name for stage in fc.scenes.plan(study)}
-    assert {"surfaces", named} <= planned == resources.required_stages(study)
+    planned = {stage.name: stage.reason for stage in fc.scenes.plan(study)}
+    assert {"surfaces", named} <= planned.keys() == resources.required_stages(study)
+    reasons = {reason for stage, reason in planned.items() if stage not in ("surfaces", named)}
+    assert reasons <= {f"{named.partition('/')[2]} needs it"}
 
 
 def test_every_estimator_has_its_requirements():
