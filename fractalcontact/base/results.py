@@ -165,7 +165,7 @@ def public_result(
                 entries.setdefault("achieved_error", achieved_error)
             elapsed = time.perf_counter() - start
             if isinstance(result, xr.Dataset):
-                result = result if "run_time" in result.variables else result.assign(run_time=elapsed)
+                result = result if "run_time" in result.variables else _with_run_time(result, elapsed)
             entries.setdefault("run_time", elapsed)
             result = label(result, keep_notes=True)
             give_reasons(result, reasons)
@@ -184,6 +184,12 @@ def public_result(
         return public
 
     return decorate
+
+
+def _with_run_time(result: xr.Dataset, seconds: float) -> xr.Dataset:
+    """Return a result with its run time; `assign`, which aligns all coordinates, takes half as long again."""
+    data = {name: each for name, each in result.variables.items() if name not in result.coords}
+    return xr.Dataset({**data, "run_time": seconds}, result.coords, result.attrs)
 
 
 def _warn_unconverged(name: str, result: xr.Dataset | xr.DataArray, most: int = 5) -> None:

@@ -167,7 +167,8 @@ def partial_slip(
         warn_lay("fractalcontact.contact.partial_slip: the contact", sheared.superposition_error)
     residual = float(np.fmax.reduce(result["residual"].values))
     stated = {"method": sheared.method, **options.stated_on(grid), "solver": sheared.normal.solution.solver}
-    return result.assign_attrs(stated, achieved_residual=residual)
+    result.attrs.update(stated, achieved_residual=residual)
+    return result
 
 
 def _dataset(surface: xr.DataArray, grid: Grid, sheared: Sheared) -> xr.Dataset:

@@ -176,7 +176,8 @@ def press(
     residual = float(np.fmax.reduce(result.variables["residual"].values, axis=None))
     solvers = solvers_in_words(name for plane in planes for name in plane.solvers)
     stated = {"references": options.references(grid), **options.stated_on(grid), "solver": solvers}
-    return result.assign_attrs(stated, achieved_residual=residual)
+    result.attrs.update(stated, achieved_residual=residual)
+    return result
 
 
 def _pressed_planes(

@@ -382,4 +382,5 @@ def pressed_dataset(
     residual = float(np.max(stacked["residual"]))
     stated = {"references": pressing.references, **pressing.options.stated_on(pressing.grid)}
     stated["solver"] = solver.solvers_in_words(solvers.ravel().tolist())
-    return result.assign_attrs(stated, achieved_residual=residual)
+    result.attrs.update(stated, achieved_residual=residual)
+    return result
