@@ -319,7 +319,6 @@ def _of_gap(name: str, **more: Any) -> StageType:
     return _joint(name, needs=("joints/closure",), takes="map", reads="gap", **more)
 
 
-_ONE: dict[str, Any] = {"one_load": True, "one_direction": True}
 STAGES = (
     StageType(
         "joints/faces",
@@ -375,7 +374,7 @@ STAGES = (
         keeps=CONTACT_MAPS,
         splits=("shear", "step"),
         presses=True,
-        **_ONE,
+        one_direction=True,
     ),
     _joint(
         "closure_laws",
@@ -409,7 +408,7 @@ STAGES = (
         keys=("block", "shear", "direction", *LOADS, "bulk", "influence", "disc_radius", "tolerance"),
         required=("block",),
         fixed={"method": "elimination"},
-        **_ONE,
+        one_direction=True,
     ),
     _joint(
         "area_by_resolution",
@@ -422,7 +421,7 @@ STAGES = (
         ),
         splits=("shear",),
         presses=True,
-        **_ONE,
+        one_direction=True,
     ),
     _joint(
         PARTIAL_SLIP,
@@ -431,7 +430,7 @@ STAGES = (
         splits=("shear",),
         presses=True,
         refuses_hardness=True,
-        **_ONE,
+        one_direction=True,
     ),
     _joint(
         "elastic_dilatancy",

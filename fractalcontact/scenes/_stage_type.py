@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any, Literal
 
 from fractalcontact.scenes._result_tables import Remarks, Rows, no_remarks
+from fractalcontact.scenes._scene import LOADS
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
@@ -84,8 +85,8 @@ class StageType:
         It solves a contact: it needs elastic constants, and which loads are possible depends on the heights.
     may_be_rigid, refuses_hardness : bool
         It computes rigid faces where the material has no elastic constants; it knows elastic bodies alone.
-    one_load, one_direction : bool
-        It takes one path of load, one direction.
+    one_direction : bool
+        It takes one direction.
     keys, own : tuple of str
         The arguments that a scene may give, where they are not all of the function; and those of them that
         only its own table gives.
@@ -111,7 +112,6 @@ class StageType:
     presses: bool = False
     may_be_rigid: bool = False
     refuses_hardness: bool = False
-    one_load: bool = False
     one_direction: bool = False
     keys: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
@@ -136,6 +136,11 @@ class StageType:
     def arguments(self) -> tuple[str, ...]:
         """Return the arguments of the function that a scene may give."""
         return self.keys or arguments_of(self.function)[0]
+
+    @property
+    def one_load(self) -> bool:
+        """Whether a scene gives it one path of load, of several that the function takes."""
+        return sum(key in LOADS for key in self.arguments()) > 1
 
     def needed(self) -> tuple[str, ...]:
         """Return the arguments that a scene must give."""

@@ -156,7 +156,6 @@ STAGES = (
         keeps=CONTACT_MAPS,
         splits=("step",),
         presses=True,
-        one_load=True,
         rows=rows("contact", ("step",), Column("closure", "closure"), *AREAS),
     ),
     # not below contact: its steps are others than those of the load path
@@ -169,7 +168,6 @@ STAGES = (
         keeps=SLIP_MAPS,
         presses=True,
         refuses_hardness=True,
-        one_load=True,
         rows=SLIP_TABLE,
     ),
 )
