@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.study import group_of, provenance_of
-from fractalcontact.base.units import PER_LENGTH, Scale, quantity_text
+from fractalcontact.base.units import Scale, quantity_text
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import quantity, table, words
+from fractalcontact.plotting._inputs import quantity, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH, by_shear
 from fractalcontact.plotting._strength import shear_curve, strength_envelope
@@ -144,52 +144,31 @@ def _flow_panels(
     """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
     axes: AxesArray = _style.panel_row(figure, 3, A4)
     last = None
-    if closure is not None:
-        data = _with_dims(closure)
-        pressure, gap = (
-            quantity(data, "nominal_pressure", PATH, "normal stress"),
-            quantity(data, "mean_gap", PATH),
-        )
-        if laws is not None:
-            slopes = table(_with_dims(laws), "stiffness", PATH)
-        else:
-            slopes = secant_stiffness(pressure.values, table(data, "interface_closure", PATH))
-        for ax, values in zip(axes, (Quantity(slopes, PER_LENGTH, "normal stiffness"), gap), strict=False):
-            last = _draw_flow(ax, data, pressure, values, [values.values])
-    if flow is not None and "nominal_pressure" in flow.variables:
-        data = _with_dims(flow, "axis")
-        pressure = quantity(data, "nominal_pressure", PATH, "normal stress")
-        flows = table(data, "transmissivity", ("axis", *PATH))
-        last = _draw_flow(axes[2], data, pressure, Quantity(flows, FLOW, "transmissivity"), flows)
+    shown = (("stiffness", laws), ("mean_gap", closure), ("transmissivity", flow))
+    for ax, (name, data) in zip(axes, shown, strict=True):
+        if data is not None and "nominal_pressure" in data.variables:
+            last = _draw_flow(ax, data, name)
     if last is not None:
         last.draw_legends(ax=axes[2])
     return axes
 
 
-def _draw_flow(ax: Axes, data: xr.Dataset, pressure: Quantity, values: Quantity, kinds: Any) -> LinePanel:
-    """Draw a quantity against the normal stress, of each kind of flow in its line."""
+def _draw_flow(ax: Axes, data: xr.Dataset, name: str) -> LinePanel:
+    """Draw a quantity against the normal stress; of a flow each axis in its line."""
+    data = data.expand_dims([dim for dim in ("axis", *PATH) if dim not in data.dims])
+    pressure = quantity(data, "nominal_pressure", PATH, "normal stress")
+    values = quantity(data, name, ("axis", *PATH))
+    if name == "transmissivity":
+        values = Quantity(values.values, FLOW, name)
     panel = LinePanel(ax, pressure, values, by_shear(data), points=_style.MAX_MARKED_POINTS)
     names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
-    for i, rows in enumerate(kinds):
-        name, line = (names[i], _style.LINES[i % 2]) if names else (values.name, "-")
-        panel.curves(name, rows, key=name if names else "", ls=line, ms=3.0)
+    for i, rows in enumerate(values.values):
+        kind, line = (names[i], _style.LINES[i % 2]) if names else (values.name, "-")
+        panel.curves(kind, rows, key=kind if names else "", ls=line, ms=3.0)
     panel.finish(log="xy", legend=False)
     ax.set_title(values.scale.label(values.name))
     ax.set_ylabel("")
     return panel
-
-
-def _with_dims(data: xr.Dataset, *more: str) -> xr.Dataset:
-    return data.expand_dims([dim for dim in ("shear", "step", *more) if dim not in data.dims])
-
-
-def secant_stiffness(pressure: Any, closure: Any) -> Any:
-    """Return the slope of pressure over closure; NaN where the closure does not grow."""
-    result = np.full(pressure.shape, np.nan)
-    for row, p, w in zip(result, pressure, closure, strict=True):
-        if p.size > 1 and (np.diff(w) > 0).all():
-            row[:] = np.gradient(p, w)
-    return result
 
 
 def _limits(groups: dict[str, xr.Dataset | None], notes: Sequence[str]) -> Iterator[str]:

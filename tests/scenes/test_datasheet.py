@@ -40,10 +40,7 @@ def test_panels_are_the_values(tree):
     page = figure_of(fc.scenes.datasheet(tree))
     axes = {ax.get_title(loc="left"): ax for ax in page.axes}
     closed, flow = tree["joints/closure"], tree["joints/transmissivity"]
-    stiffness = axes["normal stiffness (MPa/mm)"].lines[1]
-    expected = np.gradient(closed.nominal_pressure, closed.interface_closure[1]) / 1e9
-    np.testing.assert_allclose(stiffness.get_ydata(), expected)
-    np.testing.assert_allclose(stiffness.get_xdata(), [1, 2, 4])
+    assert "normal stiffness (MPa/mm)" not in axes  # that of `closure_laws`, which this study lacks
     gap = axes["mean gap (mm)"].lines[0]
     np.testing.assert_allclose(gap.get_ydata(), closed.mean_gap[0] * 1e3)
     drawn = [line.get_ydata() for line in axes["transmissivity (m³)"].lines]
