@@ -170,8 +170,8 @@ def test_small_budget_measures_every_method_once():
 
 def test_inputs_given_are_compared_at_equal_size_only():
     first = stub("first", [0.01, 0.02, 0.03], [0.4, 0.2, 0.1])
-    late = stub("second", [0.03, 0.09], [0.5, 0.3])
-    early = stub("second", [0.004, 0.09], [0.5, 0.3])
+    late = stub("second", [0.03, 0.06], [0.5, 0.3])
+    early = stub("second", [0.004, 0.06], [0.5, 0.3])
     assert measure_stubs(first, late)["on_pareto_front"].values.tolist() == [[True] * 3, [False] * 3]
     at_equal_size = measure_stubs(first, early, equal_parameters=True)
     assert at_equal_size["on_pareto_front"].values.tolist() == [[True] * 3, [True, False, False]]

@@ -301,7 +301,7 @@ def test_work_of_persson_in_complete_contact():
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_cylinder_has_no_summit(turned):
-    for n in range(16, 48):
+    for n in range(16, 48, 3):
         heights = -((np.arange(float(n)) - n // 2) ** 2) * np.ones((n, 1)) * 1e-8
         surface = fc.surfaces.from_array(heights.T if turned else heights, 1e-4)
         result = fc.contact.theories(surface, contact_modulus=1e9, nominal_pressure=[1e4])

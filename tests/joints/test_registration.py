@@ -330,7 +330,7 @@ def test_swapped_faces_are_refused(make_face, rough):
         assert fc.joints.register(lower, upper - 5e-4 + rest).converged
 
 
-@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize("axis", [pytest.param("x", marks=pytest.mark.slow), "y"])
 def test_face_scanned_face_up_is_recognised_and_turned_over(make_face, rough, axis):
     lower, upper = moved_pair(rough, (3.0, -2.0), noise=0.02, size=90)
     turned = -upper[::-1] if axis == "x" else -upper[:, ::-1]

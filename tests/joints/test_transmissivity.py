@@ -306,7 +306,8 @@ def test_multigrid_of_many_cells_and_elimination_of_few_agree(
     if contrast is not None:
         gap = np.cbrt(np.where(np.random.default_rng(5).random(gap.shape) < 0.45, 1.0, contrast))
     small = fc.joints.transmissivity(make_face(gap, periodic=periodic), axis="x")
-    many = make_face(side_by_side(gap, 7, periodic=periodic), periodic=periodic)
+    count = 7 if contrast is None else 6  # a third of the cells are closed without the contrast
+    many = make_face(side_by_side(gap, count, periodic=periodic), periodic=periodic)
     assert (many > 0).sum() > 3.1e5
     large = fc.joints.transmissivity(many, axis="x")
     np.testing.assert_allclose(large.transmissivity, small.transmissivity, rtol=2e-8)

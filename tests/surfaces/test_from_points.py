@@ -268,8 +268,8 @@ def test_directions_of_a_fine_grid_have_no_interval_of_its_own_waves():
 def test_interval_of_a_gridded_profile(hurst, seeds):
     held = []
     for seed in range(100, 100 + seeds):
-        profile = fc.surfaces.fbm(4096, 1e-5, hurst=hurst, rms_increment=3e-6, rng=seed)
-        chosen = np.sort(np.random.default_rng(seed).choice(4096, 1024, replace=False))
+        profile = fc.surfaces.fbm(2048, 1e-5, hurst=hurst, rms_increment=3e-6, rng=seed)
+        chosen = np.sort(np.random.default_rng(seed).choice(2048, 512, replace=False))
         points = np.c_[profile.x.values[chosen], profile.values[chosen]]
         gridded = fc.surfaces.from_points(points, plane="xy")
         result = fc.dimensions.estimate(gridded).isel(method=0)
