@@ -145,7 +145,7 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
         fits.append(fit)
         flags.append(flag)
         seated.append(counted)
-        stiffnesses.append(stiffness(p, w))
+        stiffnesses.append(stiffness(p, w, rounding))
     columns = {name: np.array([fit[name] for fit in fits]) for name in (*FITS, *ENDS, "law_score")}
     variables: dict[str, Any] = {
         name: (outer, values.reshape(interface.shape[:-1])) for name, values in columns.items()
@@ -374,12 +374,15 @@ def _hyperbola_ends(
     return ends[0], ends[1], max(ends[2], 0.0), ends[3]
 
 
-def stiffness(pressure: Array, closure: Array) -> Array:
-    """Return dp/dw at every step, along its branch of the path; NaN where it has no neighbour there."""
+def stiffness(pressure: Array, closure: Array, rounding: float) -> Array:
+    """Return dp/dw at every step, along its branch of the path; NaN where it has no neighbour there.
+
+    It is NaN too along a branch whose closure varies by no more than `rounding`.
+    """
     values = np.full(pressure.size, math.nan)
     for branch in branches(pressure):
         steps = branch[(pressure[branch] > 0) & np.isfinite(closure[branch])]
-        if steps.size < 2:
+        if steps.size < 2 or not np.ptp(closure[steps]) > rounding:
             continue
         with np.errstate(divide="ignore", invalid="ignore"):
             slope = log_slopes(np.log(pressure[steps]), closure[steps])

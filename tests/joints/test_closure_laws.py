@@ -113,6 +113,16 @@ def test_mated_faces_have_no_law(make_face):
     assert "does not close" in result.closure_length.attrs["reason"]
 
 
+def test_mated_faces_that_close_by_rounding_have_no_stiffness(make_face, rough):
+    """Differences of that rounding are no stiffness."""
+    crack = fc.joints.Crack(make_face(1e-4 * rough((32, 32), 2), 5e-4), young=30e9, poisson=0.2, block=8e-3)
+    closed = fc.joints.closure(crack, shear=[0.0, 1e-3], nominal_pressure=np.geomspace(1e6, 3e7, 6))
+    assert np.ptp(closed.interface_closure[0].values) < 1e-18
+    stiffness = fc.joints.closure_laws(closed).stiffness
+    assert stiffness[0].isnull().all()
+    assert stiffness[1].notnull().all()
+
+
 def test_closure_by_rounding_alone_has_a_finite_length():
     # faces that are mated again after a whole period: p0 = exp(-offset / length) is beyond any double
     result = fc.joints.closure_laws(law(np.array([1.0, 3.0, 10.0]), -1e-20 + 1e-24 * np.arange(3)))
