@@ -1,6 +1,7 @@
 """The layers of the package: imports run one way, and no subpackage uses the private modules of another."""
 
 import ast
+import functools
 from pathlib import Path
 
 import pytest
@@ -22,17 +23,17 @@ ALLOWED = {
 }
 
 
+@functools.cache
 def imported_modules(path):
-    """Yield the absolute names of the modules of this package that a file imports, wherever it does so."""
-    package = ".".join(path.relative_to(ROOT.parent).with_suffix("").parts[:-1])
+    """Return the absolute names of the modules of this package that a file imports, wherever it does so."""
+    package, names = ".".join(path.relative_to(ROOT.parent).with_suffix("").parts[:-1]), []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert node.level == 0 or path.suffix == ".pyi", f"{path}: write absolute imports"
-            module = node.module or package
-            for alias in node.names:
-                yield f"{module}.{alias.name}"
+            names += [f"{node.module or package}.{alias.name}" for alias in node.names]
         elif isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
+    return names
 
 
 def imports_of(subpackage):

@@ -21,8 +21,8 @@ pytest.importorskip("resource")  # signals and limits as Unix has them
 STUDY = SOUND.replace(
     'joints = ["closure", "rigid_dilatancy"]',
     'surfaces = ["height", "describe"]\ndimensions = ["default"]\n'
-    'joints = ["closure", "elastic_dilatancy", "friction", "transmissivity"]\n'
-    'domains = ["box_dimension", "lacunarity", "islands"]\nkeep = ["state"]\n',
+    'joints = ["closure", "elastic_dilatancy", "friction"]\n'
+    'domains = ["box_dimension", "islands"]\nkeep = ["state"]\n',
 ).replace('direction = "W"', 'direction = "W"\nelastic_dilatancy = { direction = ["E", "W"] }')
 
 
