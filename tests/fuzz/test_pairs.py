@@ -72,7 +72,7 @@ def changed(tables, place, value):
     return tables | {key: changed(tables[key], rest, value) if rest else value}
 
 
-@pytest.mark.parametrize("share", [32, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("share", [48, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SCENES)
 def test_two_wrong_values_of_a_scene_are_both_named(tmp_path, name, share):
     """Of the pairs of a scene one in so many; all values are tried alone."""

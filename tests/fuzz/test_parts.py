@@ -44,10 +44,10 @@ def parts(data):
             continue
 
 
-@pytest.mark.parametrize("stride", [10, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("stride", [15, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", sorted(CALLS))
 def test_part_of_a_labelled_argument(name, stride):
-    """Every tenth part, from another one for every function; all of them took 48 s of processor time."""
+    """Every fifteenth part, from another one for every function; all of them took 48 s of processor time."""
     faults, first = {}, sorted(CALLS).index(name) % stride
     for argument, data in CALLS[name]().items():
         every = parts(data) if isinstance(data, (xr.Dataset, xr.DataArray)) else ()
