@@ -72,8 +72,17 @@ def clear_modes(
     `leak`: share of the edges from which on neighbouring modes are correlated. `least_transfer`:
     squared transfer function below which no form of a filter holds.
     """
-    rows = zip(total, clean, unblurred, strict=True)
-    return np.array([(c >= (1.0 - leak) * t) & (c > least_transfer * u) for t, c, u in rows])
+    clear = np.empty(total.shape, dtype=bool)
+    for rows in _blocks(len(total)):
+        clear[rows] = clean[rows] >= (1.0 - leak) * total[rows]
+        clear[rows] &= clean[rows] > least_transfer * unblurred[rows]
+    return clear
+
+
+def _blocks(number: int, size: int = 32) -> Iterator[slice]:
+    """Yield so many rows at a time, which the cache holds."""
+    for start in range(0, number, size):
+        yield slice(start, start + size)
 
 
 def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array:
@@ -86,8 +95,8 @@ def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array
         values = ratio.ravel()[chosen[chosen >= 0]]
         factor[octave] = lattice.median / max(float(np.median(values)), 1e-300)
     factor = factor[classes.joined]
-    for row, number in zip(ratio, classes.number, strict=True):  # no second array of the size of the surface
-        row *= factor[number]
+    for rows in _blocks(len(ratio)):  # no second array of the size of the surface
+        ratio[rows] *= factor[classes.number[rows]]
     return ratio
 
 
