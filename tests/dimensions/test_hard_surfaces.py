@@ -98,7 +98,9 @@ def _with_spikes(heights):
     return heights
 
 
-@pytest.mark.parametrize("damage", [_interpolated, _partly_rounded, _with_spikes])
+@pytest.mark.parametrize(
+    "damage", [_interpolated, pytest.param(_partly_rounded, marks=pytest.mark.slow), _with_spikes]
+)
 def test_what_is_said_of_a_map_does_not_depend_on_its_orientation(damage):
     """Reasons and exponents are those of the heights: flips and transposes change neither."""
     heights = fc.surfaces.fbm((384, 384), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1).values.copy()

@@ -203,7 +203,7 @@ def test_defects_have_a_reason_and_no_interval(defect):
     assert words in str(result.reason.values)
 
 
-@pytest.mark.parametrize("defect", ["enlarged", "interpolated"])
+@pytest.mark.parametrize("defect", [pytest.param("enlarged", marks=pytest.mark.slow), "interpolated"])
 def test_scales_that_leave_out_made_points_give_an_interval(defect):
     """`reason` advises wavelengths from eight distances of the points that were measured on."""
     change, _ = DEFECTS[defect]

@@ -354,6 +354,7 @@ def test_faces_of_different_joints_fit_neither_way(make_face, rough):
         fc.joints.register(*faces)
 
 
+@pytest.mark.slow
 @measured
 def test_swapped_and_turned_gneiss_is_refused():
     lower, upper = (
