@@ -180,12 +180,14 @@ class Scene:
         words = {key: self.wanted(key) for key in lists}
         if datasheet:
             words["joints"] = tuple(dict.fromkeys((*words["joints"], *DATASHEET)))
+        if words["domains"] and "contact" in self.tables and "joint" not in self.tables:
+            words["contact"] = tuple(dict.fromkeys((*words["contact"], PRESS)))  # the set to analyse
         return WantTable(**words, figures=figures, datasheet=datasheet)
 
     @property
     def is_pressed(self) -> bool:
         """Whether the surface is pressed along a load path, which the domains then analyse."""
-        return PRESS in self.wanted("contact")
+        return PRESS in self.want.contact
 
     def wanted(self, subpackage: str) -> tuple[str, ...]:
         """Return the words that `[want]` gives for a subpackage."""

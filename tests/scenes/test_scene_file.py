@@ -31,6 +31,16 @@ def test_valid_scene_is_read_and_planned(write):
     assert "closure is wanted" in str(fc.scenes.plan(scene))
 
 
+def test_domains_are_those_of_the_contact_that_a_scene_describes(write):
+    surface = SOUND.partition("[joint]")[0]
+    load = "[contact]\ncontact_modulus = 1e9\nnominal_pressure = [1e5, 1e6]\n"
+    scene = fc.scenes.load(write(f'{surface}{load}[want]\ndomains = ["islands"]\n'))
+    assert [stage.name for stage in fc.scenes.plan(scene)] == ["surfaces", "contact", "domains/islands"]
+    both = SOUND.partition("[want]")[0] + f'{load}[want]\ndomains = ["islands"]\n'
+    names = [stage.name for stage in fc.scenes.plan(fc.scenes.load(write(both)))]
+    assert names == ["surfaces", "joints/closure", "domains/islands"]
+
+
 def test_ranges_are_expanded(write):
     text = SOUND.replace("[1e-4, 4e-4]", "{ start = 0.0, stop = 3e-4, step = 1e-4 }")
     scene = fc.scenes.load(write(text.replace("[1.0, 10.0]", "{ first = 1.0, last = 100.0, count = 3 }")))
