@@ -93,11 +93,12 @@ def contact_domains(
             unused.remove()
     sheet = _style.sheet_of(axes, shown)
     head = [path.common] if sheet is None else []  # no room above the panels of others
+    fontsize = "medium" if window is None else "small"  # beside a window the maps are narrower
     for number, ax in enumerate(shown):
         _maps.draw_flags(ax, state[number])
         letter = rf"$\bf{{{_style.letter(number)}}}$  " if count > 1 else ""
         parts = filter(None, (*head, path.text(number), _share_text(state[number])))
-        ax.set_title(letter + ",  ".join(parts), fontsize="medium")
+        ax.set_title(letter + ",  ".join(parts), fontsize=fontsize)
     for row, ax in enumerate(zooms):
         last = min((row + 1) * columns, count) - 1
         _magnify(ax, shown[last], state[last], window, _style.letter(last))
@@ -151,7 +152,7 @@ def _magnify(ax: Any, of: Any, plane: xr.DataArray, window: Any, letter: str) ->
         spine.set(color=_style.RED, linewidth=1.0)
     left, right, *_ = extent_of(part)
     size = f",  {quantity_text(right - left, 'm')} wide" if "x" in plane.coords else ""
-    ax.set_title(rf"$\bf{{{letter}}}$  magnified{size}", fontsize="medium")
+    ax.set_title(rf"$\bf{{{letter}}}$  magnified{size}", fontsize="small")
 
 
 POSITIVE = ("pressure", "gap")

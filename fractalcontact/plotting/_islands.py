@@ -223,8 +223,9 @@ def alluvial(
         scale = scale_of(path[name])
         texts = number_texts(scale, table(path, name, ("step",)), 3)
     ax.set(xlabel=scale.label(name_of(path[name])) if name else "step", ylabel="cells in contact")
-    shown = _style.spread_indices(len(stacks), _style.MAX_LEGEND_ENTRIES)
-    ax.set_xticks(shown, [texts[place] for place in shown])
+    distance = max(1, -(-len(stacks) // _style.MAX_LEGEND_ENTRIES))
+    shown = slice((len(stacks) - 1) % distance, None, distance)  # the last one always
+    ax.set_xticks(range(len(stacks))[shown], texts[shown])
     ax.set_title(shear_text(path, data))
     ax.autoscale_view()
     ax.set_ylim(bottom=0)

@@ -96,6 +96,7 @@ def signature(
             note = f"outside the axes, of few boxes: {' to '.join(ends)}"
             place: dict[str, Any] = {"transform": panel.ax.transAxes, "ha": "right", "size": "small"}
             panel.ax.text(1.0, 1.01, note, color=_style.grey(), **place)
+            panel.ax.set_title(path.common, pad=16)  # points: above the note
     return as_array(shown)
 
 

@@ -90,6 +90,9 @@ def test_local_slopes_and_null():
     assert low < 0
     assert high > 2
     steep = result.assign(local_slope=result["local_slope"] * [[1.0, 1.0, 3.5, -1.0]])
-    (ax,) = plotting.signature(steep)
+    (ax,) = plotting.signature(steep.assign_coords(shear=("shear", [1e-3], {"units": "m"})))
     assert ax.get_ylim() == pytest.approx((-0.05, 2.05))  # no dimension is beyond 0 ... 2
     assert ax.texts[0].get_text().endswith("-1.5 to 5.2")
+    ax.figure.draw_without_rendering()
+    (title,) = ax.findobj(lambda each: getattr(each, "get_text", str)() == "$v$ = 1 mm")
+    assert not title.get_window_extent().overlaps(ax.texts[0].get_window_extent())

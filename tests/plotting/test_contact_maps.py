@@ -101,6 +101,18 @@ def test_dots_are_magnified_where_the_most_contacts_are():
     render(full)
 
 
+def test_titles_of_magnified_maps_stay_apart():
+    force = ("step", 6.55 * 5.0 ** np.arange(6), {"units": "N"})
+    paths = speckled(240, np.s_[100:101, 181:191]).isel(step=[0] * 6).assign_coords(normal_force=force)
+    axes = plotting.contact_domains(paths)
+    figure_of(axes).draw_without_rendering()
+    width = axes[0].get_window_extent().width
+    assert len(axes) == 8
+    for ax in axes:
+        titles = ax.findobj(lambda each: "$\\bf{" in getattr(each, "get_text", str)())
+        assert [title.get_window_extent().width < width for title in titles] == [True]
+
+
 def test_only_maps_of_small_cells_are_magnified():
     assert len(plotting.contact_domains(speckled(240, 0))) == 2
     assert len(plotting.contact_domains(speckled(240, 0), zoom=0)) == 1

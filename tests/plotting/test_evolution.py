@@ -102,6 +102,9 @@ def test_alluvial_bars_are_islands_and_ribbons_what_they_share():
     assert len({colours[0][2], *colours[2]}) == 3
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "4"]
     render(ax)
+    many = np.broadcast_to(cells[2], (12, *cells[2].shape)).astype(np.int8)
+    ax = plotting.alluvial(fc.domains.lineage(xr.DataArray(many, dims=("step", "y", "x"), name="state")))
+    assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "3", "5", "7", "9", "11"]
 
 
 def test_alluvial_of_one_shear_and_of_nothing(measured):
