@@ -54,13 +54,13 @@ def _jrc_scatter(state: xr.Dataset) -> str | None:
     return " to ".join(dict.fromkeys((jrc_text(low), jrc_text(high))))
 
 
-def _extreme(choose: Any) -> Any:
-    """Return a function that names the azimuth of the largest or smallest roughness."""
+def _extreme(choose: Any, fewest: int) -> Any:
+    """Return a function that names the azimuth of the largest or smallest roughness of so many at least."""
 
     def describe(data: xr.Dataset) -> str | None:
         metric = data["roughness_metric"]
         metric = metric.mean(MEMBER) if MEMBER in metric.dims else metric
-        if not metric.notnull().any():
+        if metric.count() < fewest:
             return None
         at = metric.isel(azimuth=int(choose(metric.values)))
         return f"{float(at):.2f}° toward {float(at['azimuth']):g}°"
@@ -480,8 +480,8 @@ STAGES = (
         rows(
             "directional roughness (Grasselli), theta_max / (C + 1)",
             (),
-            Column("largest roughness metric", _extreme(np.nanargmax)),
-            Column("smallest roughness metric", _extreme(np.nanargmin)),
+            Column("largest roughness metric", _extreme(np.nanargmax, 1)),
+            Column("smallest roughness metric", _extreme(np.nanargmin, 2)),
             remarks=_azimuths,
         ),
     ),

@@ -254,9 +254,11 @@ def test_summary_has_roughness_and_parameters_of_iso_25178():
     assert "Azimuths are from E (+x) anticlockwise" in remarks(tree)
     metric = rose.roughness_metric
     azimuth = float(metric.azimuth[int(metric.argmax("azimuth"))])
-    assert f"largest roughness metric {float(metric.max()):.2f}° toward {azimuth:g}°" in fc.scenes.summary(
-        tree
-    )
+    largest = f"largest roughness metric {float(metric.max()):.2f}° toward {azimuth:g}°"
+    assert largest in fc.scenes.summary(tree)
+    assert "smallest roughness metric" in fc.scenes.summary(tree)
+    single = xr.DataTree.from_dict({"/joints/directional_roughness": rose.isel(azimuth=[0])})
+    assert "smallest roughness metric" not in fc.scenes.summary(single)
 
 
 @pytest.mark.parametrize(("increment", "outside"), [(1e-8, True), (3e-5, False)])
