@@ -289,7 +289,7 @@ def test_command_prints_a_row_for_each_scan_and_tells_failures_by_its_exit(tmp_p
     write_scans(tmp_path, {name: GRIDS[name] for name in names})
     files = [tmp_path / "scans" / name for name in (*names, "bad.nc")]
     files[-1].write_bytes(b"")
-    done = copied_command("roughness", *files, "-o", tmp_path / "out", "--workers", 2)
+    done = copied_command("roughness", *files, "-o", tmp_path / "out")
     assert done.returncode == 1, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) <= 40
@@ -328,7 +328,7 @@ def test_many_rows_are_cut_with_a_word(study):
     assert "of 100)" in text
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGKILL])
 def test_stopped_study_resumes_from_its_finished_scans(serial, tmp_path, number):
     scene, out = serial[0], tmp_path / "out"
     process = Copy("run", scene, "-o", out, "--workers", 2, "--quiet")
