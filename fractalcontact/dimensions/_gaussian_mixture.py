@@ -27,21 +27,11 @@ from fractalcontact.base import fft
 Array = np.ndarray[Any, np.dtype[Any]]
 
 HIGHEST = 12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, the sum a geometric series
-ALIASED, FILTERED, UNALIASED = range(3)
+# how heights were sampled: blurred before; blurred afterwards, by Gaussian weights of the neighbours; without
+# waves that are shorter than two points, as a part of a synthetic periodic surface
+FORMS = 3
+ALIASED, FILTERED, UNALIASED = range(FORMS)
 _SUM_OF_WAVES = 1.0  # spread from which on the sum over waves is the shorter one, exact to 3e-7
-
-
-@dataclass(frozen=True)
-class Form:
-    """How the heights were sampled and blurred, with the prior probability without and with a blur."""
-
-    prior: float
-    prior_blurred: float
-
-
-# ALIASED: blurred, then sampled; FILTERED: sampled, then blurred by Gaussian weights of the neighbours;
-# UNALIASED: without waves that are shorter than two points, as a part of a synthetic periodic surface
-FORMS = {ALIASED: Form(0.75, 0.4), FILTERED: Form(0.0, 0.4), UNALIASED: Form(0.25, 0.2)}
 # ln(H / (1 - H)) of the exponents of a table; between them the logarithms of bins are off by less than 1e-4
 _LOGITS = np.linspace(-5.3, 5.3, 43)
 # of the cubics that are one at -1, 0, 1 or 2, and zero at the others: coefficients of the powers, by column
@@ -210,7 +200,7 @@ class Bins:
         spread = self.nodes[0] * np.sinh(self.nodes[1] * np.arange(self.tables.shape[1]))[:, None]
         hurst = 1.0 / (1.0 + np.exp(-_LOGITS))
         # where a blur leaves nothing, a slope that no surface has
-        least = 1e-200 * np.exp(-40.0 * self.lnq)
+        least = 1e-200 * np.exp(-np.clip(40.0 * self.lnq, -160.0, 160.0))
         logs = np.empty((len(self.tables), len(spread) + 1, _LOGITS.size, self.lnq.size))
         for form, table in enumerate(self.tables):
             # only the weights of a surface that was blurred before it was sampled depend on the spread
@@ -259,7 +249,7 @@ class Bins:
         x = 2.0 * p * (np.log(corner[is_bent]) - self.lnq)
         bend = np.logaddexp(0.0, x)
         surface[is_bent] += difference / p * bend
-        power, white = np.exp(surface), np.square(noise) * self.white
+        power, white = np.exp(np.maximum(surface, -600.0)), np.square(noise) * self.white  # not zero
         total = power + white
         amplitude = 2.0 * np.log(self.noise / noise) if self.noise > 0.0 else 0.0
         found = np.zeros((theta.shape[0], 6 if slopes else 0, bins))
@@ -394,7 +384,7 @@ class Lattice:
     def _transform(self, axis: int, spread: float, edges: bool) -> list[Array]:
         n, s = self.shape[axis], spread / self.spacing[axis]
         if n == 1:
-            return [np.ones((self.t.size, 1))] * len(FORMS)
+            return [np.ones((self.t.size, 1))] * FORMS
         line, sampled = self._lines[axis]
         aliased, unaliased = line.densities(s)
         filtered = np.square(kernel_transfer(s, line.q)) * sampled

@@ -280,7 +280,7 @@ def make_bins(
     rows, columns = np.divmod(place, pilot.shape[1])
     ends = np.cumsum(np.bincount(bins))
     spreads, nodes = spread_nodes(lattice.shortest_edge, is_pilot=is_pilot)
-    tables = np.zeros((len(FORMS), spreads.size, count.size, lattice.t.size))
+    tables = np.zeros((FORMS, spreads.size, count.size, lattice.t.size))
     for k, spread in enumerate(spreads):
         transforms = lattice.transforms(float(spread), edges=True)
         for table, (along_y, along_x) in zip(tables, transforms, strict=True):

@@ -9,16 +9,17 @@ with the Gaussians j of `_gaussian_mixture`: H is the exponent, s the spread of 
 the rms increment, q_0 the wavenumber beyond which long waves have the exponent H_2, k the sharpness of that
 corner: 1 where two surfaces were added, 1 / (1 + H) of a Matern covariance, large of a sudden plateau. The
 amplitude A has a flat prior in ln A, or is (n / nu)^2 where the height n of the noise is known; the others
-have those of the constants below. Noise is absent with the probability .6, a blur with .85, a corner with
-.88; blur and sampling take one of three forms (`_gaussian_mixture.FORMS`). The logarithms of the bins are
-normal, and
+have those of the constants below. Heights were sampled after the blur, before it, or without waves shorter
+than two points. The logarithms of the bins are normal, and
 
     y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
 
 where delta is what (1) does not hold: nothing; a process of standard deviation tau, correlated over an
 octave; the fourth order in q of a filter that is no Gaussian; or a cut q_c beyond which the bins say
-nothing, with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2 (long waves). Each has a
-prior probability (`_discrepancies`).
+nothing, with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2 (long waves).
+
+Noise, a blur, a corner, sampling without aliases, a process and a cut are departures from an exact surface.
+Each is there with the same prior probability, independent of the others.
 
 For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
 unit normal variables u (the maxima, where the model holds), and Laplace's method gives its evidence and a
@@ -37,29 +38,23 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins
+from fractalcontact.dimensions._gaussian_mixture import FILTERED, FORMS, UNALIASED, Bins
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
 LOWEST, HIGHEST = 0.005, 0.995  # H
 
-# Priors. Normal in ln nu: 95 % of instruments add .7 to 36 % of the rms increment over one spacing.
-# With .8 in place of 1 the error under noise of 50 % is .12, not .02 (H = .8, 128 x 128 points);
-# with 1.2 an exact interval of H = .5 is 1.4 times as wide.
-_PRIOR_NOISE = math.log(0.05), 1.0
-# probability of noise. Exact surfaces of 128 x 128 points, H .5 and .9, 100 each: errors .0093 and .0109 with
-# .5, .0087 and .0102 with .4, .0080 and .0097 with .3; ten with noise of 20 %, H .9: .021, .030, .076
-_NOISY = 0.4
-_PRIOR_SPREAD = 0.0, 0.8  # normal in ln s, spacings: instruments sample a blur at .2 to 5 spacings
-_BLURRED = 0.15  # probability of a blur: with .5, 3 of 40 exact surfaces of 64 x 64 points were 5 bounds off
+# Priors. Probability of each departure from an exact surface: noise, blur, corner, no aliases, process, cut.
+# Of 2775 surfaces of 31 kinds, 128 x 128 points, .963, .972 and .977 of the intervals hold H with .1, .15 and
+# .2; exact ones of H .5 and .9 are .85 and 1.2 times as wide with .1 and .2 as with .15
+_DEPARTURE = 0.15
+# Normal in ln nu (of the rms increment), ln s (spacings) and ln k. 95 % of instruments add 1 to 50 %. With a
+# median of .05 noise of .3 was a blur in one of six surfaces (`directions`, H .7), with .1 exact intervals of
+# H .5 are 1.1 times as wide. With e in place of 2 for k wide bends are probable that describe any spectrum
+_PRIOR_NOISE, _PRIOR_SPREAD, _PRIOR_SHARPNESS = (math.log(0.07), 1.0), (0.0, 1.0), (0.0, 0.7)
 _LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any other self-affine surface
-_PRIOR_SHARPNESS = 0.0, 0.7  # normal in ln k, about the sum of two surfaces: 95 % are .25 to 4
 _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
-# probability of a corner. Of 160 sums each that are equal at a lag of 3 and of 8 spacings 124 and 138
-# intervals hold H with .1, 130 and 141 with .12, 137 and 148 with .15; 40 exact intervals each at H .2, .5
-# and .9 are .028, .041 and .061 wide with .1, .029 .042 .063 with .12, .032 .044 .065 with .15
-_BENT = 0.12
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
 _OCTAVE = math.log(2.0)
 
@@ -208,21 +203,21 @@ def hypotheses(spread: float | None, noise: bool | None, background: float) -> l
     """
     nan = math.nan
     found = []
-    for form, is_blurred, is_noisy, is_bent in itertools.product(FORMS, *[(False, True)] * 3):
+    for form, is_blurred, is_noisy, is_bent in itertools.product(range(FORMS), *[(False, True)] * 3):
         if (is_blurred and spread is not None) or (noise is not None and is_noisy != noise):
             continue
-        prior = FORMS[form].prior_blurred if is_blurred or spread else FORMS[form].prior
-        if prior == 0.0:
+        if form == FILTERED and not (is_blurred or spread):  # without a blur the same as ALIASED
             continue
-        if spread is None:
-            prior *= _BLURRED if is_blurred else 1.0 - _BLURRED
-        if noise is None:
-            prior *= _NOISY if is_noisy else 1.0 - _NOISY
-        prior *= _BENT if is_bent else 1.0 - _BENT
+        departures = [form == UNALIASED, is_bent]
+        departures += [] if spread is not None else [is_blurred]
+        departures += [] if noise is not None else [is_noisy]
+        log_prior = sum(math.log(_DEPARTURE if each else 1.0 - _DEPARTURE) for each in departures)
+        if form != UNALIASED and (is_blurred or spread):
+            log_prior -= math.log(2.0)  # the two forms of a blur are as probable
         blur = nan if is_blurred else spread or 0.0
         white = nan if is_noisy else background
         bend = (nan, nan, nan) if is_bent else (0.0, 0.0, 1.0)
-        found.append(Hypothesis(form, (nan, blur, white, *bend), math.log(prior)))
+        found.append(Hypothesis(form, (nan, blur, white, *bend), log_prior))
     return found
 
 
@@ -307,12 +302,10 @@ def _discrepancies(
     bins: Bins,
     pilot_spread: float,
     *,
-    holds: float = 0.8,
-    uncut: float = 0.8,
     at_cut: float = 0.5,
     least_octaves: float = 2.5,
     most_octaves: float = 3.5,
-    fourth_order: float = 0.1,
+    fourth_order: float = 0.125,
 ) -> list[Discrepancy]:
     """Return the kinds of discrepancy with their prior probabilities, which sum to one.
 
@@ -320,10 +313,6 @@ def _discrepancies(
     ----------
     bins : Bins
     pilot_spread : float
-    holds : float
-        Probability that (1) holds without a process; with .8 exact intervals are as narrow as without sums.
-    uncut : float
-        Probability that there is no cut: of .5 and .8, for both, the narrower interval of a blur of 1.
     at_cut : float
         Standard deviation of the logarithm of the power at a cut.
     least_octaves : float
@@ -331,7 +320,7 @@ def _discrepancies(
     most_octaves : float
         Octaves beyond a cut: filters of up to ten points, a levelled tenth of the extent.
     fourth_order : float
-        Of (s q)^4: the fourth cumulant of a mean over a box has .125.
+        Of (s q)^4: that of a mean over three points.
     """
     octaves = bins.lnq / _OCTAVE
     everything = np.ones(octaves.size, dtype=bool)
@@ -346,16 +335,15 @@ def _discrepancies(
         cuts.append((at_cut * 4.0 ** (cut - octaves), octaves > cut))
     cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
     fourth = fourth_order * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
-    no_cut = uncut if cuts else 1.0
     has_fourth = bool(fourth.max() > 0.01)
-    none = holds * (0.5 if has_fourth else 1.0)
-    kinds = [Discrepancy(np.zeros(octaves.size), everything, no_cut * none)]
+    uncut = 1.0 - _DEPARTURE if cuts else 1.0
+    holds = uncut * (1.0 - _DEPARTURE) * (0.5 if has_fourth else 1.0)
+    kinds = [Discrepancy(np.zeros(octaves.size), everything, holds)]
     kinds += [
-        Discrepancy(np.full(octaves.size, tau), everything, no_cut * (1.0 - holds) / len(_TAUS))
-        for tau in _TAUS
+        Discrepancy(np.full(octaves.size, tau), everything, uncut * _DEPARTURE / len(_TAUS)) for tau in _TAUS
     ]
     if has_fourth:
-        kinds.append(Discrepancy(fourth, everything, no_cut * none))
+        kinds.append(Discrepancy(fourth, everything, holds))
     return kinds + [Discrepancy(scatter, inside, (1.0 - uncut) / len(cuts)) for scatter, inside in cuts]
 
 

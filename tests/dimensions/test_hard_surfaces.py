@@ -123,3 +123,10 @@ def test_a_slightly_blurred_map_of_512_points(seed):
     found = fc.dimensions.estimate(fc.surfaces.from_array(blurred, 1e-4)).isel(method=0)
     assert found.hurst == pytest.approx(0.5, abs=0.03)
     assert 0.02 < float(found.ci_high - found.ci_low) < 0.05
+
+
+def test_spacings_that_differ_by_orders_overflow_nothing():
+    heights = fc.surfaces.fbm((175, 130), 1e-4, hurst=0.6, rms_increment=1e-6, rng=3).values
+    for spacing in ((1e-7, 3e-3), (3e-3, 1e-7), (0.12, 350.0)):
+        found = fc.dimensions.estimate(fc.surfaces.from_array(heights, spacing)).isel(method=0)
+        assert np.isfinite(found.ci_low) or str(found.reason.values)
