@@ -18,6 +18,7 @@ import numpy as np
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.numbers import float_array
+from fractalcontact.base.regression import slopes
 from fractalcontact.base.study import joined_references
 from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, MaterialTable, Scene, SurfaceTable
@@ -61,7 +62,8 @@ def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None =
         source = joined_references(source, surface.attrs["references"])
         done.append(f"{_points(surface['filled_points'])} filled in")
     if table.level is not None:
-        before, tilt = rms_height(surface), math.degrees(math.atan(math.hypot(*mean_slopes(surface))))
+        tilt = math.degrees(math.atan(math.hypot(*slopes(surface.values, spacing_of(surface)))))
+        before = rms_height(surface)
         surface = surfaces.level(surface, table.level)
         ends = [quantity_text(height, "m") for height in (before, rms_height(surface))]
         if table.level > 0:
@@ -78,21 +80,14 @@ def rms_height(surface: xr.DataArray) -> float:
     return float(surface.std())
 
 
-def mean_slopes(surface: xr.DataArray) -> tuple[float, float]:
-    """Return the slopes (y, x) of the least-squares plane of the heights that are there."""
-    known = np.isfinite(surface.values)
-    y, x = np.meshgrid(surface["y"], surface["x"], indexing="ij")
-    plane = np.stack([y[known], x[known], np.ones(int(known.sum()))], axis=-1)
-    slopes = np.linalg.lstsq(plane, surface.values[known], rcond=None)[0]
-    return float(slopes[0]), float(slopes[1])
-
-
 def plane_share(surface: xr.DataArray) -> float:
     """Return the part of the mean square height that the mean plane carries."""
     total = rms_height(surface)
-    slope_y, slope_x = mean_slopes(surface) if total > 0 else (0.0, 0.0)
+    if not total > 0:
+        return 0.0
+    slope_y, slope_x = slopes(surface.values, spacing_of(surface))
     plane = slope_y * surface["y"] + slope_x * surface["x"] + 0.0 * surface
-    return (rms_height(plane) / total) ** 2 if total > 0 else 0.0
+    return (rms_height(plane) / total) ** 2
 
 
 def generator_options(table: SurfaceTable) -> dict[str, Any]:
