@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from typing import Any
 
@@ -58,6 +59,11 @@ def python_number(value: Any) -> Any:
     """Return one number of NumPy or xarray as one of Python, whose arithmetic does not overflow."""
     has_no_axes = getattr(value, "ndim", None) == 0 and getattr(value, "dtype", np.dtype("O")).kind in "iuf"
     return value.item() if has_no_axes and not np.ma.is_masked(value) else value
+
+
+def power_of_two(value: float) -> float:
+    """Return the power of two next above a value, by which a division loses no digit; 1 for zero."""
+    return math.ldexp(1.0, math.frexp(value)[1]) if value > 0 else 1.0
 
 
 def float_array(value: Any) -> Array:

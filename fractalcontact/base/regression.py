@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, power_of_two
 
 # smallest singular value over the largest for which the points fix the polynomial: it is 6e-17 of a plane
 # through one line, 2e-6 through two neighbouring rows of 512 points, 6e-8 of 4096
@@ -43,7 +43,7 @@ def shifted(heights: Array) -> tuple[Array, float, float]:
         low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     offset = heights - reference
     largest = max(high - reference, reference - low)
-    scale = math.ldexp(1.0, math.frexp(largest)[1]) if largest > 0 else 1.0
+    scale = power_of_two(largest)
     offset /= scale
     return offset, reference, scale
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import Array, float_array, power_of_two
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import PAPER, joined_references
 from fractalcontact.base.validation import Problems, given_option
@@ -406,11 +406,6 @@ def scaled_body(
 def length_unit(spacing: tuple[float, float]) -> float:
     """Return the power of two in which lengths of the plane are measured."""
     return power_of_two(max(spacing))
-
-
-def power_of_two(value: float) -> float:
-    """Return the power of two next above `value`; 1 for zero."""
-    return float(np.ldexp(1.0, int(np.frexp(value)[1]))) if value > 0 else 1.0
 
 
 def strips(

@@ -12,7 +12,7 @@ from scipy import optimize, special
 
 from fractalcontact.base import spectra
 from fractalcontact.base.grid import Grid, read_grid
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import Array, float_array, power_of_two
 from fractalcontact.base.regression import detrended, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -173,7 +173,7 @@ class Spectrum:
 def _spectrum(heights: Array, grid: Grid) -> Spectrum:
     """Return the moments and rings of a surface; lengths are scaled, so that no power overflows."""
     values, _, scale = shifted(heights)
-    unit = math.ldexp(1.0, math.frexp(max(grid.spacing))[1])
+    unit = power_of_two(max(grid.spacing))
     steps = [step / unit for step in grid.spacing]
     if not all(grid.periodic):
         values, _ = detrended(values, 1)

@@ -17,7 +17,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, warn
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
 
@@ -264,7 +264,7 @@ def find_pose(
     largest = max(float(np.nanmax(np.abs(face))) for face in (lower, upper))
     if largest == 0:
         return Pose(determined=False)
-    unit = math.ldexp(1.0, math.frexp(largest)[1])
+    unit = power_of_two(largest)
     lower, upper = lower / unit, upper / unit
     widest = min(*lower.shape, *upper.shape) / 16.0
     pose = Pose(shift=coarse_shift(lower, upper, offset, widest))

@@ -16,7 +16,7 @@ import xarray as xr
 from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.grid import periodic_axes, read_grid
 from fractalcontact.base.labelled import leading_coords
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints import _flow_network
@@ -215,7 +215,7 @@ def gap_flows(
     largest = float(gap.max())
     if not largest > 0:
         return [_no_flow(gap.shape)] * len(axes)
-    unit = float(np.ldexp(1.0, int(np.frexp(largest)[1])))
+    unit = power_of_two(largest)
     cells = (gap / unit) ** 3
     network = _flow_network.link_network(cells, ratio, wraps)
     flows = [_flow_along(axis, network, cells, ratio, order, repeats=wraps[axis]) for axis in axes]

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.regression import detrended, shifted
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems
@@ -235,7 +235,7 @@ def _filled(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) 
     values, reference, scale = shifted(heights)
     gaps = _gaps(missing, periodic)
     low, high = _rims(values, gaps, periodic)
-    unit = math.ldexp(1.0, math.frexp(min(spacing))[1])
+    unit = power_of_two(min(spacing))
     steps = [step / unit for step in spacing]
     plates = missing.copy()
     while plates.any():

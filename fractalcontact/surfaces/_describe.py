@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base import spectra
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.labelled import check_leading
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.regression import RANK, scaled_slopes, shifted
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
@@ -175,7 +175,7 @@ def _statistics_in_blocks(
         problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
     if not size:
         return _nothing(surface.shape)
-    scale = math.ldexp(1.0, math.frexp(high - low)[1]) if high > low else 1.0
+    scale = power_of_two(high - low)
     mean, (unit, steps) = (total / size + (origin - low)) / scale, _scaled_steps(spacing)
     x, half = np.linspace(-1.0, 1.0, nx), 0.5 * max(ny - 1, 1)
     powers, gram, right, sums = np.zeros(4), np.zeros((3, 3)), np.zeros(3), np.zeros((axes + 2, 2))
@@ -229,7 +229,7 @@ def _row_blocks(surface: xr.DataArray) -> Iterator[tuple[Array, int]]:
 
 def _scaled_steps(spacing: Sequence[float]) -> tuple[float, list[float]]:
     """Return the unit of length, a power of two, and the spacing in it."""
-    unit = math.ldexp(1.0, math.frexp(max(spacing))[1])
+    unit = power_of_two(max(spacing))
     return unit, [step / unit for step in spacing]
 
 

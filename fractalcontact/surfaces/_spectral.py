@@ -12,7 +12,7 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.compass import check_direction, read_direction
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import Array, float_array, power_of_two
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
@@ -157,7 +157,7 @@ def spectral(
     sizes, steps = _from_array.sizes_and_steps(shape, spacing)
     target, rms = given_option(rms_height=rms_height, rms_slope=rms_slope)
     of_slope, expected = target == "rms_slope", normalise == "expectation"
-    unit = _length_unit(steps)
+    unit = power_of_two(max(steps))
     cutoffs = {"long_cutoff": long_cutoff, "rolloff": rolloff, "short_cutoff": short_cutoff}
     band = _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, direction)
     ny, nx = (1, *sizes)[-2:]
@@ -188,15 +188,10 @@ def _wavelengths(
     return longest, corner, shortest
 
 
-def _length_unit(steps: Sequence[float]) -> float:
-    """Return the power of two above the coarser spacing: lengths in it do not change a bit with the unit."""
-    return math.ldexp(1.0, math.frexp(max(steps))[1])
-
-
 def _check_modes(problems: Problems, band: _Band, shape: Any, spacing: Any) -> None:
     """Check that some mode of the grid lies inside the band."""
     sizes, steps = _from_array.sizes_and_steps(shape, spacing)
-    unit = _length_unit(steps)
+    unit = power_of_two(max(steps))
     waves = [
         2.0 * math.pi / (n * step / unit) * np.arange(n // 2 + 1)
         for n, step in zip(sizes, steps, strict=True)
@@ -266,9 +261,9 @@ class _Band:
         anisotropy_ratio: float,
         direction: str | float,
     ) -> _Band:
-        """Return the band of a surface, with wavenumbers in rad per `_length_unit`."""
+        """Return the band of a surface, with wavenumbers in rad per power of two above the spacing."""
         sizes, steps = _from_array.sizes_and_steps(shape, spacing)
-        unit = _length_unit(steps)
+        unit = power_of_two(max(steps))
         low, corner, high = (
             2.0 * math.pi / (length / unit) if length > 0 else math.inf
             for length in _wavelengths(sizes, steps, **cutoffs)
