@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -27,6 +26,7 @@ from fractalcontact.base.provenance import stamp
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import label
 from fractalcontact.base.signals import track
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import NONE, Problems, word_tuple
 
 Stream = np.random.Generator
@@ -405,7 +405,7 @@ def _resume(
     unfinished = _unfinished(empty, file)
     if unfinished is None:
         return empty, streams.generator(rng)
-    entropy = json.loads(unfinished.attrs["provenance"])["random"]
+    entropy = provenance_of(unfinished)["random"]
     source = streams.generator(entropy if rng is None else rng)
     if streams.record(source) != entropy:
         return empty, source

@@ -61,6 +61,11 @@ def python_number(value: Any) -> Any:
     return value.item() if has_no_axes and not np.ma.is_masked(value) else value
 
 
+def spread_indices(count: int, most: int) -> list[int]:
+    """Return at most `most` of the indices 0 ... count - 1, evenly spread and including both ends."""
+    return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(count, most))})
+
+
 def power_of_two(value: float) -> float:
     """Return the power of two next above a value, by which a division loses no digit; 1 for zero."""
     return math.ldexp(1.0, math.frexp(value)[1]) if value > 0 else 1.0

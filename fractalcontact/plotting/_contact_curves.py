@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _paths, _style
@@ -192,7 +193,7 @@ def pressure_distribution(
     with Problems("fc.plotting") as problems:
         count = data.sizes["pressure_class"]
         problems.require(count > 0, "result.pressure_class", "at least one entry", NONE)
-    data = data.isel(step=_style.spread_indices(data.sizes["step"], _style.MOST_CURVES))
+    data = data.isel(step=spread_indices(data.sizes["step"], _style.MOST_CURVES))
     share = table(data, "area_share", ("step", "pressure_class"))
     greatest, nominal = (table(data, name, ("step",)) for name in names[1::2])
     classes = np.asarray(data["pressure_class"].values, dtype=np.float64)

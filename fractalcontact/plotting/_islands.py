@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
@@ -75,7 +76,7 @@ def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
     """Draw the number of islands that are at least as large as each, a curve for each mask."""
     areas = np.asarray(data["area"].values, dtype=float).ravel()
     family, groups = _masks_of(data)
-    shown = _style.spread_indices(len(groups), _style.MAX_LEGEND_ENTRIES)
+    shown = spread_indices(len(groups), _style.MAX_LEGEND_ENTRIES)
     labels = [family.labels[i] for i in shown] if family.labels else ()
     family = ordered(labels, family.name, family.unit, len(shown))
     size = Quantity(areas, scale_of(data["area"]), name_of(data["area"]))

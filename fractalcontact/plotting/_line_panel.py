@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import quantity, table
 from fractalcontact.plotting._style import Axes
@@ -49,7 +50,7 @@ class Family:
 
     def legend(self) -> list[Any]:
         """Return the entries of the legend, thinned out where they are many."""
-        shown = _style.spread_indices(len(self.labels), _style.MAX_LEGEND_ENTRIES)
+        shown = spread_indices(len(self.labels), _style.MAX_LEGEND_ENTRIES)
         return [_style.legend_line(self.labels[i], **self.styles[i]) for i in shown]
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import Drawing
 from fractalcontact.plotting._inputs import as_dataset, nearest, quantity, table, words
 from fractalcontact.plotting._line_panel import Family, ordered
-from fractalcontact.plotting._style import spread_indices
 from fractalcontact.plotting._units import PLAIN, Quantity, Units, name_of, number_texts, scale_of, shown_in
 
 PATH = ("shear", "step")

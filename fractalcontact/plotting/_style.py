@@ -247,13 +247,6 @@ def legend_line(label: str, **style: Any) -> Any:
     return Line2D([], [], label=label, **{"color": grey(), **style})
 
 
-def spread_indices(count: int, most: int) -> list[int]:
-    """Return at most `most` of the indices 0 ... count - 1, evenly spread and including both ends."""
-    if count <= 0:
-        return []
-    return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(count, most))})
-
-
 def letter(number: int) -> str:
     """Return A, B, C ... for points marked on a curve and shown as maps."""
     return chr(ord("A") + number) if number < 26 else str(number + 1)

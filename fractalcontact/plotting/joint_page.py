@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.grid import read_grid
 from fractalcontact.base.study import group_of, provenance_of
 from fractalcontact.base.units import Scale, quantity_text
 from fractalcontact.plotting import _style
@@ -105,11 +106,9 @@ def _source(tree: xr.DataTree) -> str:
     version = str(tree.attrs.get("source", "fractalcontact"))
     if heights is None or "height" not in heights:
         return version
-    height = heights["height"]
-    spacing = quantity_text(float(height["x"][1] - height["x"][0]), "m")
-    sides = [float(height[dim][1] - height[dim][0]) * height.sizes[dim] for dim in ("y", "x")]
-    edges = " x ".join(quantity_text(side, "m") for side in sides)
-    return f"face of {edges}, {spacing} apart; {version}"
+    grid = read_grid(heights["height"])
+    edges = " x ".join(quantity_text(side, "m") for side in grid.extent)
+    return f"face of {edges}, {quantity_text(grid.spacing[-1], 'm')} apart; {version}"
 
 
 def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:

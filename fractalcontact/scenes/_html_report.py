@@ -22,7 +22,9 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.files import written_whole
+from fractalcontact.base.grid import read_grid
 from fractalcontact.base.netcdf import open as open_result
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CORE_DIMS
@@ -31,7 +33,7 @@ from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes._domain_stages import SIGNATURE, SIGNATURE_TABLE
 from fractalcontact.scenes._export import tables
-from fractalcontact.scenes._result_tables import SCAN, spread, table_of
+from fractalcontact.scenes._result_tables import SCAN, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, pictured
 from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page_of
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
@@ -237,8 +239,7 @@ def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:
     if min(values.shape) < 2 or not known.any():
         return None
     lowest, highest = float(values[known].min()), float(values[known].max())
-    steps = [float(coarse[dim][1] - coarse[dim][0]) for dim in CORE_DIMS]
-    extent = [step * size for step, size in zip(steps, coarse.shape, strict=True)]
+    extent = read_grid(coarse).extent
     scaled = np.where(known, (values - lowest) / ((highest - lowest) or 1.0), 0.0)
     missing = np.iinfo("<u2").max  # the level of a point without height
     levels = np.where(known, np.rint(scaled * (missing - 1)), missing).astype("<u2")
@@ -293,7 +294,7 @@ def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most:
     state = dataset[name]
     dims = [str(dim) for dim in state.dims[:-2]]
     limit = most if len(dims) < 2 else math.isqrt(most)
-    shown = {dim: spread(state.sizes[dim], limit) for dim in dims}
+    shown = {dim: spread_indices(state.sizes[dim], limit) for dim in dims}
     dataset = dataset.isel(shown)
     state = dataset[name]
     key = _key(state)

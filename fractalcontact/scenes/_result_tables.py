@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 
@@ -121,7 +122,7 @@ class ResultTable:
         """Return at most so many rows, evenly spread from the first to the last."""
         if len(self.keys) <= most:
             return self
-        places = spread(len(self.keys), most)
+        places = spread_indices(len(self.keys), most)
         rest = f"{len(places)} of {len(self.keys)}"
         heads = (f"{self.key_heads[0]} ({rest})", *self.key_heads[1:])
         keys, cells = (tuple(rows[i] for i in places) for rows in (self.keys, self.cells))
@@ -268,11 +269,6 @@ def _over_members(
 def _decimals_of(spread: float) -> int:
     """Return the decimals that show a standard deviation with two digits."""
     return max(0, 1 - int(np.floor(np.log10(spread))))
-
-
-def spread(count: int, most: int) -> Array:
-    """Return at most so many places, evenly spread from the first to the last."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def at_value(name: str, dim: str, value: Any) -> Any:

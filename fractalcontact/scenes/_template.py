@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import files_of, is_pattern
+from fractalcontact.base.grid import read_grid
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
@@ -228,15 +229,13 @@ def _facts(surface: xr.DataArray) -> dict[str, Any]:
             raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])
         message = "scan: expected a surface, got a profile: see fractalcontact.dimensions.estimate"
         raise InvalidInput(WHERE, [message])
-    steps = [float(surface[dim][1] - surface[dim][0]) for dim in ("y", "x")]
-    extent = min(surface.sizes[dim] * step for dim, step in zip(("y", "x"), steps, strict=True))
-    statistics = surfaces.describe(surface)
+    grid, statistics = read_grid(surface), surfaces.describe(surface)
     return {
-        "spacing": max(steps),
-        "extent": extent,
+        "spacing": max(grid.spacing),
+        "extent": min(grid.extent),
         "slope": float(statistics["rms_slope"]),
         "missing": bool(surface.isnull().any()),
-        "periodic": any("period" in surface[dim].attrs for dim in ("y", "x")),
+        "periodic": any(grid.periodic),
         "of_points": "gridding" in provenance_of(surface),
         "in_plane": provenance_of(surface).get("plane") == "best fit",
     }
