@@ -147,6 +147,8 @@ def _flow_panels(
     for ax, (name, data) in zip(axes, shown, strict=True):
         if data is not None and "nominal_pressure" in data.variables:
             last = _draw_flow(ax, data, name)
+        else:
+            ax.set_axis_off()  # a blank place, not a panel without a curve
     if last is not None:
         last.draw_legends(ax=axes[2])
     return axes

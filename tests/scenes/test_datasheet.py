@@ -41,6 +41,7 @@ def test_panels_are_the_values(tree):
     axes = {ax.get_title(loc="left"): ax for ax in page.axes}
     closed, flow = tree["joints/closure"], tree["joints/transmissivity"]
     assert "normal stiffness (MPa/mm)" not in axes  # that of `closure_laws`, which this study lacks
+    assert [ax.axison for ax in page.axes if not ax.has_data()] == [False]  # whose place stays blank
     gap = axes["mean gap (mm)"].lines[0]
     np.testing.assert_allclose(gap.get_ydata(), closed.mean_gap[0] * 1e3)
     drawn = [line.get_ydata() for line in axes["transmissivity (m³)"].lines]
