@@ -173,6 +173,13 @@ def test_scan_with_gaps_is_filled_where_it_is_pressed(scans):
     assert tomllib.loads(fc.scenes.template("contact", "gaps.nc", young=1e9))["surface"]["fill"] is True
 
 
+def test_part_of_a_periodic_surface_is_levelled(scans):
+    whole = fc.surfaces.spectral((48, 48), 1e-4, hurst=0.8, rms_height=1e-5, rng=1)
+    assert "level" not in tomllib.loads(fc.scenes.template("roughness", "lower.nc", surface=whole))["surface"]
+    part = whole.isel(x=slice(None, 24), y=slice(None, 24))
+    assert tomllib.loads(fc.scenes.template("roughness", "lower.nc", surface=part))["surface"]["level"] == 1
+
+
 def test_coarse_surface_has_no_roughness_coefficient(scans):
     lower = fc.open("lower.nc")
     fc.save(fc.surfaces.from_array(1e5 * lower.values, 10.0), "land.nc")
