@@ -52,7 +52,7 @@ class Free(NamedTuple):
 class Plane:
     """The grid on which a call works: points along (y, x), whether both wrap around, number of planes."""
 
-    shape: tuple[int, int]
+    shape: tuple[int, ...]
     periodic: bool = False
     planes: int = 1
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ import numpy as np
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.files import datasets_folder
+from fractalcontact.base.grid import read_grid
 from fractalcontact.base.numbers import float_array
 from fractalcontact.base.regression import slopes
 from fractalcontact.base.study import joined_references
@@ -62,7 +63,7 @@ def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None =
         source = joined_references(source, surface.attrs["references"])
         done.append(f"{_points(surface['filled_points'])} filled in")
     if table.level is not None:
-        tilt = math.degrees(math.atan(math.hypot(*slopes(surface.values, spacing_of(surface)))))
+        tilt = math.degrees(math.atan(math.hypot(*slopes(surface.values, read_grid(surface).spacing))))
         before = rms_height(surface)
         surface = surfaces.level(surface, table.level)
         ends = [quantity_text(height, "m") for height in (before, rms_height(surface))]
@@ -85,7 +86,7 @@ def plane_share(surface: xr.DataArray) -> float:
     total = rms_height(surface)
     if not total > 0:
         return 0.0
-    slope_y, slope_x = slopes(surface.values, spacing_of(surface))
+    slope_y, slope_x = slopes(surface.values, read_grid(surface).spacing)
     plane = slope_y * surface["y"] + slope_x * surface["x"] + 0.0 * surface
     return (rms_height(plane) / total) ** 2
 
@@ -98,9 +99,7 @@ def generator_options(table: SurfaceTable) -> dict[str, Any]:
     return options
 
 
-def surface_grid(
-    scene: Scene, face: xr.DataArray | None = None
-) -> tuple[tuple[int, int], tuple[float, float]]:
+def surface_grid(scene: Scene, face: xr.DataArray | None = None) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """Return shape and spacing (y, x; m) of the surface; a generated one is not made for that.
 
     A surface that has been read is the `face`.
@@ -111,17 +110,11 @@ def surface_grid(
         return (int(shape[0]), int(shape[1])), (float(spacing[0]), float(spacing[1]))
     # its heights do not matter: what is removed from them, or filled, leaves the grid as it is
     as_read = replace(scene.surface, despike=False, fill=False, level=None)
-    surface = read_surface(as_read, scene.folder) if face is None else face
-    return (surface.sizes["y"], surface.sizes["x"]), spacing_of(surface)
+    grid = read_grid(read_surface(as_read, scene.folder) if face is None else face)
+    return grid.shape, grid.spacing
 
 
-def spacing_of(surface: xr.DataArray) -> tuple[float, float]:
-    """Return the spacing (y, x; m) of a surface."""
-    y, x = (float(surface[dim][1] - surface[dim][0]) for dim in ("y", "x"))
-    return y, x
-
-
-def block_shape(scene: Scene, shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[int, int]:
+def block_shape(scene: Scene, shape: tuple[int, ...], spacing: Sequence[float]) -> tuple[int, ...]:
     """Return the cells (y, x) of the block of a joint: all of the surface where the scene states no block."""
     if scene.joint.block is None:
         return shape

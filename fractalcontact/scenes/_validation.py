@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory, warn
-from fractalcontact.base.grid import distinct, plane_coords
+from fractalcontact.base.grid import distinct, plane_coords, read_grid
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.resources import require_memory
 from fractalcontact.base.schema import label
@@ -29,7 +29,6 @@ from fractalcontact.scenes._inputs import (
     call_options,
     contact_modulus,
     crack_options,
-    spacing_of,
     stage_options,
     values_of,
 )
@@ -331,11 +330,10 @@ def _empty_maps(
         return _empty_gap(scene, crack)
     if surface is None or not (scene.is_pressed or crack is not None):
         return None
-    spacing, shape = _inputs.spacing_of(surface), (surface.sizes["y"], surface.sizes["x"])
-    cells = shape if scene.is_pressed else _inputs.block_shape(scene, shape, spacing)
+    grid = read_grid(surface)
+    cells = grid.shape if scene.is_pressed else _inputs.block_shape(scene, grid.shape, grid.spacing)
     is_surface = scene.is_pressed or scene.joint.block is None
-    periodic = [is_surface and "period" in surface[dim].attrs for dim in ("y", "x")]
-    maps = _zeros(cells, spacing, periodic)
+    maps = _zeros(cells, grid.spacing, [is_surface and wraps for wraps in grid.periodic])
     return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)
 
 
@@ -345,7 +343,7 @@ def warn_of(messages: Iterable[str]) -> None:
         warn(message, ScaleWarning)
 
 
-def _rms_slope(heights: np.ndarray[Any, Any], spacing: tuple[float, float]) -> float:
+def _rms_slope(heights: np.ndarray[Any, Any], spacing: Sequence[float]) -> float:
     squares = [
         np.nanmean((np.diff(heights, axis=axis) / spacing[axis]) ** 2)
         for axis in (0, 1)
@@ -356,23 +354,20 @@ def _rms_slope(heights: np.ndarray[Any, Any], spacing: tuple[float, float]) -> f
 
 def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
     """Yield the implausible values of a scene and its surface."""
-    spacing = spacing_of(surface)
-    slope = _rms_slope(distinct(surface.values), spacing)
+    grid = read_grid(surface)
+    slope = _rms_slope(distinct(surface.values), grid.spacing)
     if slope > 3.0:  # cracks, grounds and grinds are below 1
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
-    edges = [size * step for size, step in zip(surface.shape, spacing, strict=True)]
     if scene.is_pressed:
         options = stage_options(scene, STAGES["contact"])
-        yield from _high_pressures(
-            "contact", options, float(np.prod(edges)), float(options["contact_modulus"])
-        )
+        yield from _high_pressures("contact", options, grid.nominal_area, float(options["contact_modulus"]))
     material = scene.material
     stages = [
         name for name in ("closure", "area_by_resolution", "elastic_dilatancy") if name in scene.want.joints
     ]
     if stages and material.young is not None and material.poisson is not None:
         modulus = contact_modulus(material)
-        block = edges if scene.joint.block is None else scene.joint.block
+        block = grid.extent if scene.joint.block is None else scene.joint.block
         area = float(np.prod(np.broadcast_to(block, 2)))
         for name in stages:
             loads = values_of(scene, STAGES[f"joints/{name}"])
