@@ -24,6 +24,11 @@ holes = s.where(np.random.default_rng(2).random(s.shape) > 0.1)
 print([[fc.dimensions.estimate(z)[name].item().hex() for name in ('hurst', 'ci_low', 'ci_high')]
     for z in (s, holes, s[0])])
 """,
+    "directions": """
+s = fc.surfaces.fbm((300, 307), 1e-4, hurst=0.5, rms_increment=1e-6, rng=1)
+r = fc.dimensions.directions(s)
+print([number.hex() for name in ('hurst', 'ci_low', 'ci_high') for number in r[name].values.tolist()])
+""",
 }
 
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, FILTERED, UNALIASED, kernel_transfer
+from fractalcontact.dimensions._mode_bins import block_product
 from fractalcontact.dimensions._spectral_posterior import (
     CORNER,
     HURST,
@@ -89,7 +90,7 @@ class MetricSpectrum:
                 np.polynomial.chebyshev.chebvander(q.ravel() / np.pi, _NODES - 1) for q in (y * self.dy, x)
             )
             rows = rows @ self._far_images
-            total += np.sum(rows * columns, axis=1) if y.shape == x.shape else rows @ columns.T
+            total += np.sum(rows * columns, axis=1) if y.shape == x.shape else block_product(rows, columns.T)
             np.maximum(total, 1e-300, out=total)
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):

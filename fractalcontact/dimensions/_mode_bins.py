@@ -44,7 +44,7 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
     """Return the expected power of each mode, or that part of it that is not due to the edges."""
     weight = weights(theta[0], lattice.t, form, lattice.axes, theta[1])
     rows, columns = lattice.transforms(float(theta[1]), edges=edges)[form]
-    power = _product((rows * weight[:, None]).T, columns)
+    power = block_product((rows * weight[:, None]).T, columns)
     np.maximum(power, 1e-300, out=power)
     if theta[3] > 0.0:
         corner = 2.0 * theta[5] * np.log(theta[3] / lattice.q)
@@ -53,7 +53,7 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
     return np.asarray(power)
 
 
-def _product(left: Array, right: Array, *, edge: int = 512, work: int = 1 << 18) -> Array:
+def block_product(left: Array, right: Array, *, edge: int = 512, work: int = 1 << 18) -> Array:
     """Return the matrix product, in blocks that BLAS leaves to one thread: more would change last digits."""
     product = np.empty((left.shape[0], right.shape[1]))
     for column in range(0, right.shape[1], edge):
