@@ -86,6 +86,8 @@ def detrended(heights: Array, order: int) -> tuple[Array, bool]:
 
 def slopes(heights: Array, spacing: Sequence[float]) -> tuple[float, ...]:
     """Return the slope of the mean plane along each axis, y first; NaN if it is undetermined."""
+    if not np.isfinite(heights).any():
+        return (math.nan,) * heights.ndim
     values, _, scale = shifted(heights)
     return tuple(scale * slope for slope in scaled_slopes(values, spacing))
 
