@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.numbers import power_of_two
 from fractalcontact.dimensions._curve import NO_NOISE, chi_square_z, misfit_reason
 from fractalcontact.dimensions._records import (
     CONSTANT,
@@ -110,7 +111,7 @@ def _line(moments: Moments, spacing: tuple[float, ...], order: int, pilot: float
     along = [6, 0][2 - axes :]  # y, then x, of the columns of the moments
     means = np.concatenate([moments.means[start + 3 * (order - 1) :][:3] for start in along])
     # logarithms of numbers near one: the unit of height changes no bit
-    means = means / np.ldexp(1.0, np.frexp(np.nanmax(means, initial=0.0))[1])
+    means = means / power_of_two(float(np.nanmax(means, initial=0.0)))
     usable = np.isfinite(means) & (means > 0) & (np.arange(3 * axes) % 3 < lags)
     by_axis = usable.reshape(axes, 3)
     by_axis &= np.count_nonzero(by_axis, axis=1, keepdims=True) > 1

@@ -100,23 +100,20 @@ def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array
     return ratio
 
 
-def single_waves(lattice: Lattice, ratio: Array, keep: Array, at_once: int = 32) -> Array:
-    """Return the modes of single waves: boxes whose mean power is improbable for Gaussian heights.
-
-    So many rows `at_once`, which the cache holds.
-    """
+def single_waves(lattice: Lattice, ratio: Array, keep: Array) -> Array:
+    """Return the modes of single waves: boxes whose mean power is improbable for Gaussian heights."""
     from scipy.special import chdtri
 
     size = 3**lattice.axes
     limit = float(chdtri(lattice.degrees * size, _FALSE_ALARM / ratio.size)) / lattice.degrees
     marked = np.zeros(ratio.shape, dtype=bool)
-    for start in range(0, len(ratio), at_once):
-        near = slice(max(start - 1, 0), start + at_once + 1)
+    for rows in _blocks(len(ratio)):
+        near = slice(max(rows.start - 1, 0), rows.stop + 1)
         level = np.where(keep[near], ratio[near], 1.0)
-        level = np.pad(level, ((int(start == 0), int(start + at_once >= len(ratio))), (1, 1)))
+        level = np.pad(level, ((int(rows.start == 0), int(rows.stop >= len(ratio))), (1, 1)))
         level = level[:-2] + level[1:-1] + level[2:]
         for row, column in np.argwhere(level[:, :-2] + level[:, 1:-1] + level[:, 2:] > limit):
-            row += start
+            row += rows.start
             marked[max(row - 1, 0) : row + 2, max(column - 1, 0) : column + 2] = True
     return marked
 

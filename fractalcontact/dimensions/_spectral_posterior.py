@@ -46,12 +46,13 @@ HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
 LOWEST, HIGHEST = 0.005, 0.995  # H
 
 # Priors. Probability of each departure from an exact surface: noise, blur, corner, no aliases, process, cut.
-# Of 2775 surfaces of 31 kinds, 128 x 128 points, .963, .972 and .977 of the intervals hold H with .1, .15 and
-# .2; exact ones of H .5 and .9 are .85 and 1.2 times as wide with .1 and .2 as with .15
+# Of 2775 surfaces of 34 kinds, 128 x 128 points, .963, .972 and .977 of the intervals hold H with .1, .15 and
+# .2 (posteriors weighted anew); exact ones are about .9 and 1.2 times as wide with .1 and .2 as with .15
 _DEPARTURE = 0.15
-# Normal in ln nu (of the rms increment), ln s (spacings) and ln k. 95 % of instruments add 1 to 50 %. With a
-# median of .05 noise of .3 was a blur in one of six surfaces (`directions`, H .7), with .1 exact intervals of
-# H .5 are 1.1 times as wide. With e in place of 2 for k wide bends are probable that describe any spectrum
+# Normal in ln nu (of the rms increment), ln s (spacings) and ln k. 95 % of instruments add noise of 1 to
+# 50 %: with a median of .05 the intervals of `directions` missed H = .7 in one of six surfaces with noise of
+# .3, with .1 exact intervals of H = .5 are 1.1 times as wide. 95 % of k are .25 to 4: with a factor of e in
+# place of 2 white noise is taken for a wide bend
 _PRIOR_NOISE, _PRIOR_SPREAD, _PRIOR_SHARPNESS = (math.log(0.07), 1.0), (0.0, 1.0), (0.0, 0.7)
 _LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any other self-affine surface
 _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
@@ -206,14 +207,17 @@ def hypotheses(spread: float | None, noise: bool | None, background: float) -> l
     for form, is_blurred, is_noisy, is_bent in itertools.product(range(FORMS), *[(False, True)] * 3):
         if (is_blurred and spread is not None) or (noise is not None and is_noisy != noise):
             continue
-        if form == FILTERED and not (is_blurred or spread):  # without a blur the same as ALIASED
+        has_blur = is_blurred or bool(spread)
+        if form == FILTERED and not has_blur:  # the same as ALIASED
             continue
         departures = [form == UNALIASED, is_bent]
-        departures += [] if spread is not None else [is_blurred]
-        departures += [] if noise is not None else [is_noisy]
+        if spread is None:
+            departures.append(is_blurred)
+        if noise is None:
+            departures.append(is_noisy)
         log_prior = sum(math.log(_DEPARTURE if each else 1.0 - _DEPARTURE) for each in departures)
-        if form != UNALIASED and (is_blurred or spread):
-            log_prior -= math.log(2.0)  # the two forms of a blur are as probable
+        if has_blur and form != UNALIASED:
+            log_prior -= math.log(2.0)  # a blur before sampling is as probable as one after it
         blur = nan if is_blurred else spread or 0.0
         white = nan if is_noisy else background
         bend = (nan, nan, nan) if is_bent else (0.0, 0.0, 1.0)

@@ -12,6 +12,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.labelled import check_leading
+from fractalcontact.base.numbers import power_of_two
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.validation import Problems
 
@@ -57,7 +58,7 @@ class Surface:
         if self._heights is None:
             raw = self.raw
             low, high = _height_range(raw)
-            self._unit = _height_unit(low, high)
+            self._unit = power_of_two(high - low)
             self._heights = raw - low
             self._heights *= 1.0 / self._unit
         return self._heights
@@ -353,7 +354,7 @@ def _distinct(values: Array) -> Array:
 
 def _check_squares(problems: Problems, stack: Array) -> None:
     ranges = [_height_range(np.asarray(heights, dtype=np.float64)) for heights in stack]
-    units = [_height_unit(low, high) for low, high in ranges if high > low]
+    units = [power_of_two(high - low) for low, high in ranges if high > low]
     if any(not SMALLEST_UNIT <= unit <= LARGEST_UNIT for unit in units):
         expected = (
             f"heights over a range of {SMALLEST_UNIT:.0e} m to {LARGEST_UNIT:.0e} m, "
@@ -367,8 +368,3 @@ def _height_range(heights: Array) -> tuple[float, float]:
     if np.isnan(low):
         low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     return low, high
-
-
-def _height_unit(low: float, high: float) -> float:
-    """Return the power of two next above the range of heights."""
-    return float(np.ldexp(1.0, np.frexp(high - low)[1])) if high > low else 1.0
