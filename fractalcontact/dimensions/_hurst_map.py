@@ -50,7 +50,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     NOISE,
     SPREAD,
     Posterior,
-    mixture_quantile,
+    mixture_interval,
     posterior,
 )
 from fractalcontact.dimensions._surface_input import (
@@ -217,9 +217,9 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
     degrees = 0.5 * model.lattice.degrees * model.count * share
     levels = log_means(np.maximum(mean, 1e-300), degrees)
-    mixture = model.components(*levels, windows.new_share, scales is not None)
-    quantiles = (mixture_quantile(share, *mixture) for share in (0.025, 0.5, 0.975))
-    for place, low, hurst, high in zip(chosen, *quantiles, strict=True):
+    shares, centres, deviations = model.components(*levels, windows.new_share, scales is not None)
+    for place, centre, deviation in zip(chosen, centres, deviations, strict=True):
+        low, hurst, high = mixture_interval(shares, centre, deviation)
         record = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high)
         wide = f"the heights of a window do not determine its exponent: {low:.2f} to {high:.2f} is as likely"
         records[place] = record.without_interval(wide) if high - low > WIDEST else record

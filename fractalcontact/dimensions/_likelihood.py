@@ -4,7 +4,7 @@
 2. Modes that the edges, a filter or single waves dominate are left out; the lay is divided out; gaps are
    filled, and their effect on the power is corrected.
 3. The bins of the modes that are left have one posterior (`_spectral_posterior`): its median is the
-   estimate, its 2.5 and 97.5 % quantiles are the interval.
+   estimate, the shortest interval with a probability of 95 % the interval.
 
 Whole periodic surfaces have Fourier modes; profiles are the case of one axis.
 """
@@ -273,7 +273,7 @@ def _estimate(
     psf: float | None,
 ) -> Estimate:
     """Return the record of a posterior, with what was found in words."""
-    low, middle, high = (found.quantile(share) for share in (0.025, 0.5, 0.975))
+    low, middle, high = found.interval()
     discrepancy = found.most_probable[1]
     dx = surface.spacing[1]
     inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx

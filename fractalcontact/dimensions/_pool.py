@@ -14,7 +14,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.dimensions._estimate import estimate
 from fractalcontact.dimensions._likelihood import likelihood
-from fractalcontact.dimensions._spectral_posterior import joint_quantiles
+from fractalcontact.dimensions._spectral_posterior import joint_interval
 from fractalcontact.dimensions._surface_input import read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -28,7 +28,6 @@ FEWER = "fewer than two scans have an interval"
 MODELS = ("random", "common")
 ESTIMATES = "results of fractalcontact.dimensions.estimate, or one along `scan`"
 SURFACES = "surfaces, whose likelihoods are multiplied"
-QUANTILES = 0.025, 0.5, 0.975
 DISAGREE = 1e-3  # probability of chi square from which on scans have no common exponent
 NEEDED = ("hurst", "standard_error", "fractal_dimension", "scale_min", "scale_max")
 
@@ -147,7 +146,7 @@ def pool(scans: Any, method: str | None = None, *, model: str = "random") -> xr.
     random = random_effects(hurst, error)
     low, mean, high, reason = random.low, random.mean, random.high, FEWER if not used.any() else ""
     if model == "common" and used.any():
-        low, mean, high = joint_quantiles([found.posteriors[n] for n in np.flatnonzero(used)], QUANTILES)
+        low, mean, high = joint_interval([found.posteriors[n] for n in np.flatnonzero(used)])
         low -= found.too_high[used].max()
         if float(np.sum(((hurst - mean) / error) ** 2)) > chdtri(hurst.size - 1, DISAGREE):
             low = high = np.nan

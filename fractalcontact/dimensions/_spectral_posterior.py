@@ -46,9 +46,9 @@ HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
 LOWEST, HIGHEST = 0.005, 0.995  # H
 
 # Priors. Probability of each departure from an exact surface: noise, blur, corner, no aliases, process, cut.
-# Of 2775 surfaces of 34 kinds, 128 x 128 points, .963, .972 and .977 of the intervals hold H with .1, .15 and
-# .2 (posteriors weighted anew); exact ones are about .9 and 1.2 times as wide with .1 and .2 as with .15
-_DEPARTURE = 0.15
+# Intervals of 10800 surfaces of 33 kinds, 128 x 128 points, hold H in .960, .968, .973, .978 and .984 with
+# .06, .08, .1, .12 and .15; fewer than .9 in 14, 12, 9, 6 and 5 of 96 cells; widths .85 to 1 (weighted anew)
+_DEPARTURE = 0.1
 # Normal in ln nu (of the rms increment), ln s (spacings) and ln k. 95 % of instruments add noise of 1 to
 # 50 %: with a median of .05 the intervals of `directions` missed H = .7 in one of six surfaces with noise of
 # .3, with .1 exact intervals of H = .5 are 1.1 times as wide. 95 % of k are .25 to 4: with a factor of e in
@@ -130,11 +130,10 @@ class Posterior:
     hypotheses: list[Hypothesis]
     discrepancies: list[Discrepancy]
 
-    def quantile(self, share: float) -> float:
-        """Return a quantile of H."""
-        return float(
-            mixture_quantile(share, *(each.ravel() for each in (self.share, self.centre, self.scale)))
-        )
+    def interval(self) -> tuple[float, float, float]:
+        """Return the ends of the shortest interval of H with a probability of 95 %, and the median."""
+        some = self.share > 1e-12
+        return mixture_interval(*(each[some] for each in (self.share, self.centre, self.scale)))
 
     def log_density(self, u: Array) -> Array:
         """Return the logarithm of the density of u."""
@@ -163,28 +162,33 @@ class Posterior:
         )
 
 
-def mixture_quantile(share: float, shares: Array, centre: Array, scale: Array) -> Array:
-    """Return a quantile of H whose u has a sum of normal distributions, those along the last axis."""
-    from scipy.special import ndtr
+def mixture_interval(
+    share: Array, centre: Array, scale: Array, *, points: int = 161, rounds: int = 4
+) -> tuple[float, float, float]:
+    """Return the interval of H, and the median between, of a sum of normal distributions of u.
 
-    low, high = np.full(centre.shape[:-1], -8.0), np.full(centre.shape[:-1], 8.0)  # of u
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        below = np.sum(shares * ndtr((middle[..., None] - centre) / scale), axis=-1)
-        low, high = np.where(below < share, middle, low), np.where(below < share, high, middle)
-    return np.asarray(LOWEST + (HIGHEST - LOWEST) * ndtr(low))
-
-
-def joint_quantiles(
-    posteriors: Sequence[Posterior], shares: Sequence[float], points: int = 4001, zooms: int = 5
-) -> list[float]:
-    """Return quantiles of the H that independent surfaces have in common, each with nuisances of its own.
-
-    Their product has the prior of u, the unit normal distribution, once. The grid of `points` is narrowed
-    `zooms` times to where its logarithm is within 20 of the highest.
+    Each round takes `points` where the one before expects equal steps of a normal distribution. Four find a
+    deviation of .0005 of u. The intervals of 150 surfaces of 34 kinds were up to .01 wider than the
+    shortest (.0005 in the median).
     """
     from scipy.special import ndtr
 
+    wanted = np.r_[0.0, ndtr(np.linspace(-4.0, 4.0, points)), 1.0]
+    u, below = np.array([-8.0, 8.0]), np.array([0.0, 1.0])
+    for _ in range(rounds):
+        u = np.interp(wanted, below, u)
+        below = np.r_[0.0, ndtr((u[1:-1, None] - centre) / scale) @ share, 1.0]
+    return _shortest(u, below)
+
+
+def joint_interval(
+    posteriors: Sequence[Posterior], *, points: int = 4001, zooms: int = 5
+) -> tuple[float, float, float]:
+    """Return the interval of the H that independent surfaces have in common, and the median between.
+
+    Each has nuisances of its own. Their product has the prior of u, the unit normal distribution, once. The
+    grid of `points` is narrowed `zooms` times to where its logarithm is within 20 of the highest.
+    """
     low, high = -8.0, 8.0
     for _ in range(zooms):
         u = np.linspace(low, high, points)
@@ -192,8 +196,28 @@ def joint_quantiles(
         near = np.flatnonzero(log > log.max() - 20.0)
         low, high = u[max(near[0] - 1, 0)], u[min(near[-1] + 1, u.size - 1)]
     density = np.exp(log - log.max())
-    found = np.interp(np.asarray(shares) * density.sum(), np.cumsum(density) - 0.5 * density, u)
-    return [LOWEST + (HIGHEST - LOWEST) * float(ndtr(each)) for each in found]
+    below = np.r_[0.0, np.cumsum(density[1:] + density[:-1])]
+    return _shortest(u, below / below[-1])
+
+
+def _shortest(u: Array, below: Array, probability: float = 0.95) -> tuple[float, float, float]:
+    """Return the ends of the shortest interval of H with the probability, and the median between.
+
+    `below` is the probability of less than u. A parabola through three starts lets the ends move evenly.
+    """
+    from scipy.special import ndtr
+
+    hurst = LOWEST + (HIGHEST - LOWEST) * ndtr(u)
+    starts = hurst[below <= 1.0 - probability]
+    ends = np.interp(below[: starts.size] + probability, below, hurst)
+    k = int(np.argmin(ends - starts))
+    low = starts[k]
+    if 0 < k < starts.size - 1:
+        near = slice(k - 1, k + 2)
+        second, first, _ = np.polyfit(starts[near] - low, (ends - starts)[near], 2)
+        low += np.clip(-0.5 * first / second, *(starts[near] - low)[[0, 2]]) if second > 0.0 else 0.0
+    high = np.interp(np.interp(low, hurst, below) + probability, below, hurst)
+    return float(low), float(np.interp(0.5, below, hurst)), float(high)
 
 
 def hypotheses(spread: float | None, noise: bool | None, background: float) -> list[Hypothesis]:

@@ -46,7 +46,7 @@ def within_binomial_bounds(count, trials, share):
 
 
 def test_isotropic_surface():
-    result = fc.dimensions.directions(brownian(256, 0.7, 1))
+    result = fc.dimensions.directions(brownian(256, 0.7, 2))
     assert result["hurst"].dims == ("azimuth",)
     assert result["azimuth"].values[[0, 2, 4, 6]] == pytest.approx([0, 45, 90, 135])
     assert ((result["ci_low"] < 0.7) & (result["ci_high"] > 0.7)).all()

@@ -60,18 +60,57 @@ def test_evidence_of_noise_by_quadrature():
     assert np.log(ratio) == pytest.approx(np.log(expected), abs=0.5)
 
 
-def test_shares_sum_to_one_and_quantiles_ascend():
+def test_shares_sum_to_one():
     found = sp.posterior(bins_of(0.5))
     assert found.share.sum() == pytest.approx(1.0)
     kinds = {id(kind): kind for kind in found.discrepancies}  # a kind stands at each of its maxima
     assert sum(kind.prior for kind in kinds.values()) == pytest.approx(1.0)
     assert sum(np.exp(hypothesis.log_prior) for hypothesis in found.hypotheses) == pytest.approx(1.0)
-    quantiles = [found.quantile(share) for share in (0.025, 0.25, 0.5, 0.75, 0.975)]
-    assert np.all(np.diff(quantiles) > 0.0)
+    low, median, high = found.interval()
+    assert low < median < high
 
 
 def test_level_changes_nothing():
     bins = bins_of(0.5)
-    found = sp.posterior(bins).quantile(0.5)
+    found = sp.posterior(bins).interval()
     bins.level[:] += 7.0
-    assert sp.posterior(bins).quantile(0.5) == pytest.approx(found, abs=1e-4)
+    assert sp.posterior(bins).interval() == pytest.approx(found, abs=1e-4)
+
+
+MIXTURES = {
+    "one": ([1.0], [0.3], [0.1]),
+    "narrow": ([1.0], [0.3], [5e-4]),
+    "skewed": ([0.7, 0.2, 0.1], [0.0, 0.1, 0.4], [0.05, 0.1, 0.3]),
+    "two maxima": ([0.6, 0.4], [-0.5, 0.5], [0.1, 0.1]),
+    "at the end": ([0.8, 0.2], [-2.0, -1.0], [0.5, 1.0]),
+}
+
+
+@pytest.mark.parametrize("name", MIXTURES)
+def test_interval_is_the_shortest_by_root_finding(name):
+    from scipy.optimize import brentq
+    from scipy.stats import norm
+
+    share, centre, scale = map(np.array, MIXTURES[name])
+
+    def below(hurst):
+        u = norm.ppf((hurst - sp.LOWEST) / (sp.HIGHEST - sp.LOWEST))
+        return share @ norm.cdf((u - centre) / scale)
+
+    def quantile(probability):
+        u = brentq(lambda u: share @ norm.cdf((u - centre) / scale) - probability, -9.0, 9.0, xtol=1e-13)
+        return sp.LOWEST + (sp.HIGHEST - sp.LOWEST) * norm.cdf(u)
+
+    low, median, high = sp.mixture_interval(share, centre, scale)
+    widths = [quantile(p + 0.95) - quantile(p) for p in np.linspace(1e-6, 0.05 - 1e-6, 401)]
+    assert below(high) - below(low) == pytest.approx(0.95, abs=1e-3)
+    assert high - low == pytest.approx(min(widths), rel=0.01)
+    assert median == pytest.approx(quantile(0.5), abs=1e-3 * (high - low))
+    if name == "skewed":
+        assert high - low < 0.97 * (quantile(0.975) - quantile(0.025))
+
+
+def test_joint_interval_of_one_surface_is_its_own():
+    found = sp.posterior(bins_of(0.5))
+    low, _, high = found.interval()
+    assert sp.joint_interval([found]) == pytest.approx(found.interval(), abs=0.01 * (high - low))
