@@ -42,8 +42,9 @@ def inner_kernel(function: F) -> F:
 def sum_kernel(function: F) -> F:
     """Compile a serial loop whose sums over a row may be vectorised, which is several times as fast.
 
-    The compiler chooses the order of the sums; it is the same in every call, for any number of threads. The
-    arrays must be finite.
+    The compiler chooses the order of the sums; it is the same in every call, for any number of threads, where
+    they are summed in local variables (in an array it depends on the places of the arrays). The arrays must
+    be finite.
     """
     return _compile(function, fastmath={"reassoc", "nsz", "nnan"})
 

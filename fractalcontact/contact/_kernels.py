@@ -229,10 +229,12 @@ def select_free_set(  # type: ignore[no-untyped-def]
             for j in range(nx):
                 row_sum[j] += x[i, j]
         for b in range(bins.shape[1]):  # not over all nodes with j // columns: divisions take long
-            bins[k, b], counts[k, b] = 0, 0
+            # not summed in the arrays: whether that is vectorised would depend on their places in memory
+            total, count = zero, zero
             for j in range(b * columns, min(b * columns + columns, nx)):
-                bins[k, b] += row_sum[j]
-                counts[k, b] += row_count[j]
+                total += row_sum[j]
+                count += row_count[j]
+            bins[k, b], counts[k, b] = total, count
         out[k, 0] = changes
 
 
@@ -262,9 +264,10 @@ def sum_outside(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-u
             for j in range(mx):
                 row[j] += 0 * x[i, j] if mask[i, j] else x[i, j]
         for b in range(bins.shape[1]):
-            bins[k, b] = 0
+            total = x.dtype.type(0)
             for j in range(b * columns, min(b * columns + columns, mx)):
-                bins[k, b] += row[j]
+                total += row[j]
+            bins[k, b] = total
 
 
 @sum_kernel
