@@ -19,6 +19,7 @@ import xarray as xr
 
 from fractalcontact.base import netcdf, signals
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
+from fractalcontact.base.file_contents import stage_rows
 from fractalcontact.base.files import PARTIAL_RESULT, RESULT, locked, written_whole
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK, most_workers
@@ -230,15 +231,15 @@ def _run(
         raise signals.Stopped(
             stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
         )
-    calls = partial(_save_and_draw, tree, scene, folder, progress), partial(page_contents, tree)
+    calls = partial(_save_and_draw, tree, scene, folder, progress), partial(_page_and_summary, tree)
     # a copy of this process prepares the page meanwhile
     results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
-    figures, contents = results[0], results[1]
+    figures, (contents, whole) = results[0], results[1]
     with _beside_the_result(), pictures_of(figures) as pictures:
         if scene.want.figures:
             note_run_time(tree, start)
             _results_folder.remove_old_figures(folder, figures)
-        whole = summary_of(tree)
+        whole = replace(whole, stages=stage_rows(tree))  # with the time of the figures
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         netcdf.replace_attributes(folder / RESULT, changed)
@@ -258,6 +259,10 @@ def _save_and_draw(tree: xr.DataTree, scene: Scene, folder: Path, progress: bool
     (folder / PARTIAL_RESULT).unlink(missing_ok=True)
     with _beside_the_result():
         return _draw(tree, folder, progress) if scene.want.figures else []
+
+
+def _page_and_summary(tree: xr.DataTree) -> tuple[dict[str, Any], Summary]:
+    return page_contents(tree), summary_of(tree)
 
 
 def _text(tree: xr.DataTree, whole: Summary | None, *, verbose: bool) -> str:
