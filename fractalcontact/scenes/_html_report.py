@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import importlib.resources
 import io
 import json
 import math
@@ -14,9 +13,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -37,9 +35,7 @@ from fractalcontact.scenes._result_tables import SCAN, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, pictured
 from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page_of
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
-
-if TYPE_CHECKING:
-    from jinja2 import Template
+from fractalcontact.scenes._template import packaged_template
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -189,7 +185,7 @@ def _page(
     scene = scene_of(tree)
     written = str(tree.attrs.get("history", "")).split(" ")[0]
     subtitle = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
-    return _template().render(
+    return packaged_template("report_template.html", autoescape=True).render(
         title=summary.title,
         subtitle=" · ".join(str(part) for part in subtitle if part),
         generator=str(tree.attrs.get("source", "fractalcontact")),
@@ -206,16 +202,6 @@ def _page(
         references=str(tree.attrs.get("references", "")),
         **contents,
     )
-
-
-@cache
-def _template() -> Template:
-    """Return the template of the page, which takes longer to compile than to render: a page for each scan."""
-    from jinja2 import Environment  # here: a study without a folder has no report
-
-    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    file = importlib.resources.files("fractalcontact.scenes").joinpath("report_template.html")
-    return environment.from_string(file.read_text(encoding="utf-8"))
 
 
 def _scans(tree: xr.DataTree) -> list[str]:

@@ -167,17 +167,18 @@ def template(
 
 def _scene(**values: Any) -> str:
     """Return the text of a scene."""
-    return _question_template().render(values)
+    return packaged_template("question.toml.jinja", keep_trailing_newline=True).render(values)
 
 
 @cache
-def _question_template() -> Template:
-    from jinja2 import Environment  # only here and for the report
+def packaged_template(file: str, **options: bool) -> Template:
+    """Return a template of this package, which takes longer to compile than to render."""
+    from jinja2 import Environment  # here: a study without a folder renders nothing
 
-    environment = Environment(trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True)
+    environment = Environment(trim_blocks=True, lstrip_blocks=True, **options)  # type: ignore[arg-type]
     environment.filters["toml"] = _toml
-    file = importlib.resources.files("fractalcontact.scenes").joinpath("question.toml.jinja")
-    return environment.from_string(file.read_text(encoding="utf-8"))
+    path = importlib.resources.files("fractalcontact.scenes").joinpath(file)
+    return environment.from_string(path.read_text(encoding="utf-8"))
 
 
 def _files(scan: Files) -> list[Path]:
