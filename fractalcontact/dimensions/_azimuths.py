@@ -26,7 +26,6 @@ from fractalcontact.base import fft
 from fractalcontact.base.spectra import half_wavenumbers
 from fractalcontact.dimensions._diagnosis import rounding_noise
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, mixture, spread_nodes
-from fractalcontact.dimensions._likelihood import rms_increment
 from fractalcontact.dimensions._metric_spectrum import MetricSpectrum, gaussian_tables, metric_of
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
@@ -36,6 +35,7 @@ from fractalcontact.dimensions._mode_bins import (
     fill,
     joined_classes,
     log_means,
+    rms_increment,
 )
 from fractalcontact.dimensions._spectral_posterior import (
     HURST,
@@ -61,6 +61,7 @@ _CUT_OFF = 1e-4  # power of a ring over that an octave before; a blur of a spaci
 _POSSIBLE = 1e-3  # probability of a hypothesis whose azimuths are looked at
 _ROUNDS = 12  # of a fit, 2 to 6 of which were needed
 IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
+NO_METRIC = "the surface does not fit the model, anisotropic fractional Brownian: the scatter is unknown"
 _EXPONENTS, _STEP = np.linspace(0.02, 0.98, 13, retstep=True)  # between which logarithms are linear to 1 %
 _SAME = 0.03  # change of the log ratio that needs no other expected power
 
@@ -385,6 +386,8 @@ class AzimuthFit:
         Components of the log ratio.
     covariance : ndarray, shape (2, 2)
         Of these.
+    bins : Bins
+        Its rings.
     found : Posterior
     p_values : tuple of float
         That an isotropic surface, and one of this metric, differs as much between azimuths; NaN where
@@ -397,13 +400,20 @@ class AzimuthFit:
     spectrum: MetricSpectrum
     uv: Array
     covariance: Array
+    bins: Bins
     found: Posterior
     p_values: tuple[float, float]
     scale: float
 
 
-def fit_azimuths(surface: Surface, scales: Scales) -> AzimuthFit | None:
-    """Fit the waves of a surface by azimuth, wavelengths `scales` in x spacings; None if they are too few."""
+def fit_azimuths(
+    surface: Surface, scales: Scales, *, spread: float | None = None, noise: float | None = None
+) -> AzimuthFit | None:
+    """Fit the waves of a surface by azimuth; None if they are too few.
+
+    `scales`: wavelengths in x spacings, whose exponent is estimated as they are. `spread`: of a known blur,
+    in x spacings. `noise`: height of known noise, in the unit of the heights.
+    """
     observed = np.isfinite(surface.heights)
     is_complete = bool(observed.all())
     scale = rms_increment(surface.heights)
@@ -411,9 +421,12 @@ def fit_azimuths(surface: Surface, scales: Scales) -> AzimuthFit | None:
     dy = surface.plane_spacing[0]
     modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_complete and all(surface.grid.periodic))
     power = modes.power(heights)
-    options: dict[str, Any] = {"background": rounding_noise(surface) / scale, "is_window": scales is not None}
     if scales is not None:
-        options |= {"spread": 0.0, "noise": False}
+        spread, noise = spread or 0.0, noise or 0.0
+    background = rounding_noise(surface) / scale
+    known = math.hypot(noise / scale, background) if noise else 0.0
+    options: dict[str, Any] = {"background": background, "is_window": scales is not None}
+    options |= {"spread": spread, "noise": None if noise is None else noise > 0.0}
     low, high = (0.0, np.inf) if scales is None else scales
     band = max(low, _shortest(modes, power)), high
 
@@ -427,14 +440,14 @@ def fit_azimuths(surface: Surface, scales: Scales) -> AzimuthFit | None:
 
     def most_probable(
         classes: Classes, spectrum: MetricSpectrum, uv: Array, is_pilot: bool
-    ) -> tuple[Posterior, MetricSpectrum, Array, Array]:
-        """Return the posterior, and the spectrum with its log ratio and covariance.
+    ) -> tuple[Bins, Posterior, MetricSpectrum, Array, Array]:
+        """Return bins and posterior, and the spectrum with its log ratio and covariance.
 
         The probability of a hypothesis is multiplied by that of the azimuths, with a metric of its own.
         """
-        spread = float(spectrum.theta[SPREAD]) if scales is None else 0.0
-        bins = classes.bins(spectrum, is_pilot=is_pilot)
-        found = posterior(bins, pilot_spread=spread, is_pilot=is_pilot, **options)
+        pilot = float(spectrum.theta[SPREAD]) if spread is None else 0.0
+        bins = replace(classes.bins(spectrum, is_pilot=is_pilot), noise=known)
+        found = posterior(bins, pilot_spread=pilot, is_pilot=is_pilot, **options)
         fits, share = [], np.zeros_like(found.share)
         for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE):
             theta = found.theta[m, int(np.argmax(found.share[m]))]
@@ -445,7 +458,7 @@ def fit_azimuths(surface: Surface, scales: Scales) -> AzimuthFit | None:
             share[m] = found.share[m] * math.exp(0.5 * (least - deviance))
         found = replace(found, share=share / share.sum())
         spectrum, uv, covariance, *_ = max(fits, key=lambda fit: float(found.share[fit[4]].sum()))
-        return found, replace(spectrum, metric=metric_of(*uv)), uv, covariance
+        return bins, found, replace(spectrum, metric=metric_of(*uv)), uv, covariance
 
     uv = np.zeros(2)
     spectrum = MetricSpectrum(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 1.0]), ALIASED, metric_of(*uv), dy)
@@ -460,7 +473,7 @@ def fit_azimuths(surface: Surface, scales: Scales) -> AzimuthFit | None:
             if math.hypot(*(uv - before)) > _SAME and rounds < _ROUNDS - 1:
                 continue
         before = uv
-        found, spectrum, uv, covariance = most_probable(classes, spectrum, uv, rounds == 0)
+        bins, found, spectrum, uv, covariance = most_probable(classes, spectrum, uv, rounds == 0)
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
         if rounds > 0 and math.hypot(*(uv - before)) < _SAME and np.ptp(change) < 0.7:
             break
@@ -474,9 +487,9 @@ def fit_azimuths(surface: Surface, scales: Scales) -> AzimuthFit | None:
         again = classes_of(spectrum)
         if again is not None:
             classes = again
-            found, spectrum, *_ = most_probable(classes, spectrum, np.zeros(2), False)
+            bins, found, spectrum, *_ = most_probable(classes, spectrum, np.zeros(2), False)
             spectrum = replace(spectrum, metric=isotropic)
-    return AzimuthFit(classes, spectrum, uv, covariance, found, p_values, scale)
+    return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values, scale)
 
 
 def _filled_levels(classes: Classes, observed: Array) -> tuple[Array, Array]:

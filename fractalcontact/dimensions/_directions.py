@@ -13,7 +13,13 @@ from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._azimuths import IMPROBABLE, LARGEST_LOG_RATIO, AzimuthFit, fit_azimuths
+from fractalcontact.dimensions._azimuths import (
+    IMPROBABLE,
+    LARGEST_LOG_RATIO,
+    NO_METRIC,
+    AzimuthFit,
+    fit_azimuths,
+)
 from fractalcontact.dimensions._diagnosis import diagnose
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
 from fractalcontact.dimensions._metric_spectrum import squared_length
@@ -55,7 +61,6 @@ _AWAY_FROM_ISOTROPY = 2.447746830680816  # root of the 95 % quantile of chi squa
 _WHITE, _STANDARD_ERRORS = 0.05, 3.0  # exponent above which heights are correlated, also in standard errors
 _NO_VARIATION = "the heights do not vary along this direction"
 _LEAST_SHARE = 1e-4  # of a maximum of the posterior that counts
-_NO_MODEL = "the surface does not fit the model, anisotropic fractional Brownian: the scatter is unknown"
 _UNCORRELATED = "heights without correlation have no anisotropy ratio"
 _FILLED = "the surface is smooth, and filling its gaps made shorter waves than it has: give a complete part"
 _RIDGES = (
@@ -256,7 +261,7 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
     if anisotropy.reason == _FILLED:
         reason = _FILLED
     elif anisotropy.reason == _RIDGES or fit.p_values[1] < IMPROBABLE:
-        reason = _NO_MODEL
+        reason = NO_METRIC
     every, *each = fit.classes.along(fit.spectrum, azimuths)
     records = [
         _along(fit, a, along, every, surface.unit, reason) for a, along in zip(azimuths, each, strict=True)

@@ -20,6 +20,7 @@ import numpy as np
 from fractalcontact.base.regression import detrended
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.units import quantity_text
+from fractalcontact.dimensions._azimuths import IMPROBABLE, NO_METRIC, fit_azimuths
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise, unevenness
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._mode_bins import (
@@ -30,9 +31,11 @@ from fractalcontact.dimensions._mode_bins import (
     expected_power,
     fill,
     filling_ratio,
+    is_oblique,
     lay,
     levels_by_azimuth,
     make_bins,
+    rms_increment,
     single_waves,
     stretch,
     whitened,
@@ -83,6 +86,8 @@ class ModeFit:
     information : float or ndarray
     theta : ndarray
     form : int
+    is_oblique : bool
+        The lay is oblique to the axes, and cosine modes do not know the sign of an azimuth.
     """
 
     lattice: Lattice
@@ -93,6 +98,7 @@ class ModeFit:
     information: Array | float
     theta: Array
     form: int
+    is_oblique: bool
 
     def bins(self, keep: Array | None = None) -> Bins:
         """Return the bins of the modes that count, or of some of them."""
@@ -132,6 +138,10 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
             else "that the edges of the surface do not dominate"
         )
         return undefined(f"{number} modes {what}, at least {LEAST * LEAST_BINS} are needed")
+    if fit.is_oblique and not fit.lattice.periodic:
+        turned = _of_azimuths(surface, fit, window, noise, psf)
+        if turned is not None:
+            return replace(turned, note=joined(marks, turned.note))
     unit = fit.scale * surface.unit
     background = rounding_noise(surface) / fit.scale
     bins = fit.bins(keep)
@@ -147,6 +157,36 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     )
     estimate = _estimate(surface, fit, bins, found, window, unit, noise, psf)
     return replace(estimate, note=joined(marks, estimate.note))
+
+
+def _of_azimuths(
+    surface: Surface,
+    fit: ModeFit,
+    window: Scales,
+    noise: float | None,
+    psf: float | None,
+    largest: int = 2048,
+) -> Estimate | None:
+    """Return the estimate from Fourier modes, whose metric has any azimuth; None if they are too few.
+
+    Of more than the `largest` number of points along an axis those in the middle are used.
+    """
+    dx = surface.spacing[1]
+    cuts = tuple(slice(max(0, n - largest) // 2, (n + largest) // 2) for n in surface.heights.shape)
+    azimuths = fit_azimuths(
+        surface.with_heights(surface.heights[cuts]),
+        None if window is None else (window[0] / dx, window[1] / dx),
+        spread=None if psf is None else psf / dx,
+        noise=None if noise is None else noise / surface.unit,
+    )
+    if azimuths is None:
+        return None
+    unit = azimuths.scale * surface.unit
+    estimate = _estimate(surface, fit, azimuths.bins, azimuths.found, window, unit, noise, psf)
+    lag = float(azimuths.spectrum.metric[1, 1])  # of one x spacing, squared
+    estimate = replace(estimate, rms_increment=estimate.rms_increment * lag ** (0.5 * estimate.hurst))
+    has_metric = not azimuths.p_values[1] < IMPROBABLE
+    return estimate if has_metric or estimate.reason else estimate.without_interval(NO_METRIC)
 
 
 def fitted_modes(surface: Surface, spread: float | None = None, corrections: int = 1) -> ModeFit | None:
@@ -166,7 +206,7 @@ def fitted_modes(surface: Surface, spread: float | None = None, corrections: int
     scale = rms_increment(heights)
     heights /= scale
     filled = fill(heights)
-    theta, form, ratio_of_lags = _first_fit(filled, lattice, spread, is_complete)
+    theta, form, ratio_of_lags, turned = _first_fit(filled, lattice, spread, is_complete)
     lattice = replace(lattice, stretch=ratio_of_lags)
     if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
         return None
@@ -202,13 +242,13 @@ def fitted_modes(surface: Surface, spread: float | None = None, corrections: int
         lattice = replace(lattice, stretch=ratio_of_lags)
     information = information / unevenness(heights)
     power /= level
-    return ModeFit(lattice, scale, power, pilot, keep, information, theta, form)
+    return ModeFit(lattice, scale, power, pilot, keep, information, theta, form, turned)
 
 
 def _first_fit(
     heights: Array, lattice: Lattice, spread: float | None, is_complete: bool
-) -> tuple[Array, int, float]:
-    """Return theta, form and stretch from the modes of the tapered surface, or of its middle.
+) -> tuple[Array, int, float, bool]:
+    """Return theta, form, stretch, and whether the lay is oblique, of the tapered surface or its middle.
 
     Its edges do not leak into short waves.
     """
@@ -227,13 +267,15 @@ def _first_fit(
     keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)
     if np.count_nonzero(keep) < LEAST * LEAST_BINS:
         keep = inside if np.count_nonzero(inside) >= LEAST * LEAST_BINS else np.ones(keep.shape, dtype=bool)
-    levels = levels_by_azimuth(torus, whitened(torus, power, pilot, keep), keep)
+    ratio = whitened(torus, power, pilot, keep)
+    levels = levels_by_azimuth(torus, ratio, keep)
+    turned = lattice.axes == 2 and is_oblique(torus, ratio, levels, 1.0 if is_periodic else TAPERED)
     torus = replace(torus, stretch=stretch(torus, levels, pilot, information=TAPERED))
     y, x = torus.wavenumbers
     pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
     bins = make_bins(torus, power, pilot, keep, is_tapered=not is_periodic, is_pilot=True)
     hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
-    return theta, hypothesis.form, torus.stretch
+    return theta, hypothesis.form, torus.stretch, turned
 
 
 def _without_plane(heights: Array) -> Array:
@@ -248,18 +290,6 @@ def _without_rim(heights: Array) -> Array:
     observed = np.isfinite(heights)
     rows, columns = np.flatnonzero(observed.any(axis=1)), np.flatnonzero(observed.any(axis=0))
     return heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-
-
-def rms_increment(heights: Array) -> float:
-    """Return the rms increment over one spacing along x, or along y if there is none."""
-    for axis in (1, 0):
-        steps = np.diff(heights, axis=axis).ravel()
-        steps = steps if np.isfinite(steps.sum()) else steps[np.isfinite(steps)]
-        # not `steps @ steps`, whose last digits depend on the threads of BLAS
-        square = float(np.einsum("i,i->", steps, steps))
-        if square > 0.0:
-            return math.sqrt(square / steps.size)
-    return 1.0
 
 
 def _estimate(

@@ -173,6 +173,25 @@ def stretch(
     return math.exp(logarithms[best] * (1.0 - by_chance / gain)) if gain > by_chance else 1.0
 
 
+def is_oblique(lattice: Lattice, ratio: Array, levels: Levels, information: float) -> bool:
+    """Return whether Fourier modes show a lay that is oblique to the axes; `ratio` is power over expected.
+
+    The probabilities of the powers of a sector are compared between waves that run up and down, by the sine
+    of twice their azimuth: a test of one degree of freedom. `information`: of a mode.
+    """
+    from scipy.special import chdtri
+
+    y, x = lattice.wavenumbers
+    y, x, values = y[levels.rows], x[levels.columns], ratio[levels.rows, levels.columns]
+    sector = _sectors(y, x)
+    mean = np.bincount(sector, values) / np.maximum(np.bincount(sector), 1)
+    probability = -np.expm1(-values / np.maximum(mean[sector], 1e-300))  # even between 0 and 1
+    wave = 2.0 * y * x / (np.square(y) + np.square(x))
+    variance = float(wave @ wave) / 12.0
+    square = information * float(wave @ (probability - 0.5)) ** 2 / max(variance, 1e-300)
+    return square > float(chdtri(1, _FALSE_ALARM))
+
+
 def lay(lattice: Lattice, levels: Levels) -> Array | float:
     """Return the relative power of the azimuth of each mode, shrunk to one as far as chance explains it.
 
@@ -305,6 +324,18 @@ def bin_numbers(lattice: Lattice, keep: Array) -> Array:
 def _bin_classes(lattice: Lattice, keep: Array, *, is_tapered: bool) -> _Classes:
     split = math.log(_ALIASED) if lattice.axes == 2 and not is_tapered else math.inf
     return _classes(lattice, keep, _OCTAVE / PER_OCTAVE, split)
+
+
+def rms_increment(heights: Array) -> float:
+    """Return the rms increment over one spacing along x, or along y if there is none."""
+    for axis in (1, 0):
+        steps = np.diff(heights, axis=axis).ravel()
+        steps = steps if np.isfinite(steps.sum()) else steps[np.isfinite(steps)]
+        # not `steps @ steps`, whose last digits depend on the threads of BLAS
+        square = float(np.einsum("i,i->", steps, steps))
+        if square > 0.0:
+            return math.sqrt(square / steps.size)
+    return 1.0
 
 
 def fill(heights: Array, sweeps: int = 12) -> Array:

@@ -428,3 +428,62 @@ def test_standard_error_is_the_scatter(points, hurst, missing, scales, members, 
     ratio = result.fitted_hurst.std("member") / result.standard_error.median("member")
     # what the model does not hold widens the intervals, most of all in a window of few rings
     assert ((ratio > 0.5) & (ratio < 1.0 + slack)).all()
+
+
+def oblique(n, hurst, seed, along_x=(4, 1), along_y=(1, 2)):
+    """Exact fractal under an oblique lay: heights of an isotropic one at points of an oblique lattice."""
+    nx, ny = (n * (one + other) for one, other in zip(along_x, along_y, strict=True))
+    complete = fc.surfaces.fbm((ny, nx), SPACING, hurst=hurst, rms_increment=1e-6, rng=seed).values
+    x, y = np.arange(n), np.arange(n)[:, None]
+    heights = complete[x * along_x[1] + y * along_y[1], x * along_x[0] + y * along_y[0]]
+    return fc.surfaces.from_array(heights, SPACING)
+
+
+@pytest.mark.parametrize(
+    ("lattice", "hurst"),
+    [
+        (((4, 1), (1, 2)), 0.7),  # lengths of 2.8 to 1
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in ((((3, 2), (1, 3)), 0.3), (((6, 1), (1, 1)), 0.5), (((2, 1), (0, 1)), 0.9))
+        ),
+    ],
+)
+def test_one_exponent_under_an_oblique_lay(lattice, hurst):
+    """Cosine modes do not tell a lay at 30 degrees from one at -30: H of .7 was .44, and no interval held."""
+    surfaces = [oblique(128, hurst, seed, *lattice) for seed in range(4)]
+    found = [fc.dimensions.estimate(surface).squeeze() for surface in surfaces]
+    assert sum(bool(each.ci_low < hurst < each.ci_high) for each in found) >= 3
+    assert np.sqrt(np.mean([(float(each.hurst) - hurst) ** 2 for each in found])) < 0.025
+    step = 1e-6 * np.hypot(*lattice[0]) ** hurst
+    assert [float(each.rms_increment) for each in found] == pytest.approx([step] * 4, rel=0.12)
+    turned = fc.dimensions.estimate(fc.surfaces.from_array(surfaces[0].values[::-1], SPACING)).squeeze()
+    assert float(turned.hurst) == pytest.approx(float(found[0].hurst), abs=3e-3)
+
+
+def test_known_noise_and_blur_under_an_oblique_lay():
+    rough = oblique(128, 0.6, 5)
+    step = float(np.sqrt(np.mean(rough.diff("x") ** 2)))
+    noise = 0.2 * step * np.random.default_rng(1).standard_normal(rough.shape)
+    noisy = fc.surfaces.from_array(rough.values + noise, SPACING)
+    blind, told = (fc.dimensions.estimate(noisy, noise=n).squeeze() for n in (None, 0.2 * step))
+    assert told.ci_low < 0.6 < told.ci_high
+    assert abs(told.hurst - 0.6) < 0.5 * abs(blind.hurst - 0.6)
+    blurred = fc.surfaces.from_array(gaussian_filter(rough.values, 1.0)[8:-8, 8:-8], SPACING)
+    sharp, known = (fc.dimensions.estimate(blurred, psf=s).squeeze() for s in (0.0, SPACING))
+    assert known.ci_low < 0.6 < known.ci_high
+    assert sharp.hurst - 0.6 > 2.0 * (known.hurst - 0.6)
+    window = fc.dimensions.estimate(rough, scales=(4 * SPACING, 64 * SPACING)).squeeze()
+    assert window.ci_low < 0.6 < window.ci_high
+
+
+def test_surfaces_without_an_oblique_lay_keep_the_cosine_modes():
+    from fractalcontact.dimensions._likelihood import fitted_modes
+    from fractalcontact.dimensions._surface_input import read_surfaces
+
+    def is_oblique(surface):
+        return fitted_modes(read_surfaces(surface)[0]).is_oblique
+
+    assert sum(is_oblique(brownian(64, 0.6, seed)) for seed in range(40)) <= 3  # .4 by chance
+    assert not is_oblique(anisotropic(128, 1, 2.0, 0.0))
+    assert is_oblique(oblique(128, 0.6, 1, (2, 1), (0, 1)))

@@ -186,6 +186,15 @@ def stretched(n: int, hurst: float, rng: Generator) -> Array:
     return brownian(2 * n, hurst, rng)[::2, :n]
 
 
+def under_oblique_lay(n: int, hurst: float, rng: Generator) -> Array:
+    """Return an exact surface whose lengths differ by 2.8 to 1, at 22 degrees to the axes.
+
+    Its points are a lattice of an isotropic surface: 4 points along x and 1 along y apart, and 1 and 2.
+    """
+    x, y = np.arange(n), np.arange(n)[:, None]
+    return brownian(5 * n, hurst, rng)[x + 2 * y, 4 * x + y]
+
+
 def through_lens(n: int, hurst: float, rng: Generator, finest: float) -> Array:
     """Return a surface seen by a lens without aberrations, in incoherent light (Goodman 2005).
 
@@ -248,6 +257,7 @@ KINDS: dict[str, tuple[Callable[..., Array], tuple[float, ...]]] = {
     "rounded": (lambda n, hurst, rng: np.round(brownian(n, hurst, rng) / 0.5) * 0.5, THREE),
     "skewed": (skewed, THREE),
     "anisotropic": (stretched, THREE),
+    "oblique_lay": (under_oblique_lay, THREE),
     "lens": (partial(through_lens, finest=3.0), THREE),
     "modulated": (modulated, THREE),
     "profile": (profile, THREE),
