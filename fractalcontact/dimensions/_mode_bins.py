@@ -35,7 +35,7 @@ TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/3
 _SAMPLES = 64, 256
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
-_FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
+FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
 _SECTORS = 9  # of azimuth, on a quarter of the plane; an odd number, so that no sector ends at the diagonal
 _OCTAVE = math.log(2.0)
 
@@ -105,7 +105,7 @@ def single_waves(lattice: Lattice, ratio: Array, keep: Array) -> Array:
     from scipy.special import chdtri
 
     size = 3**lattice.axes
-    limit = float(chdtri(lattice.degrees * size, _FALSE_ALARM / ratio.size)) / lattice.degrees
+    limit = float(chdtri(lattice.degrees * size, FALSE_ALARM / ratio.size)) / lattice.degrees
     marked = np.zeros(ratio.shape, dtype=bool)
     for rows in _blocks(len(ratio)):
         near = slice(max(rows.start - 1, 0), rows.stop + 1)
@@ -169,7 +169,7 @@ def stretch(
     square = np.square(residual) @ weight * information
     best = int(np.argmin(square))
     gain = float(square[number // 2] - square[best])
-    by_chance = float(chdtri(1, _FALSE_ALARM))
+    by_chance = float(chdtri(1, FALSE_ALARM))
     return math.exp(logarithms[best] * (1.0 - by_chance / gain)) if gain > by_chance else 1.0
 
 
@@ -189,7 +189,7 @@ def is_oblique(lattice: Lattice, ratio: Array, levels: Levels, information: floa
     wave = 2.0 * y * x / (np.square(y) + np.square(x))
     variance = float(wave @ wave) / 12.0
     square = information * float(wave @ (probability - 0.5)) ** 2 / max(variance, 1e-300)
-    return square > float(chdtri(1, _FALSE_ALARM))
+    return square > float(chdtri(1, FALSE_ALARM))
 
 
 def lay(lattice: Lattice, levels: Levels) -> Array | float:
@@ -197,13 +197,13 @@ def lay(lattice: Lattice, levels: Levels) -> Array | float:
 
     An anisotropic self-affine surface has a level of its own in each direction, and the same exponent. The
     factor is that of James and Stein (1961), Proc. 4th Berkeley Symp. 1, but for the chi square of a chance
-    of `_FALSE_ALARM` in place of its mean: the levels of few long waves reach all short ones.
+    of `FALSE_ALARM` in place of its mean: the levels of few long waves reach all short ones.
     """
     from scipy.special import chdtri
 
     square = float(levels.information @ np.square(levels.level))
     freedom = np.count_nonzero(levels.information) - 1
-    if not freedom > 0 or square <= (by_chance := float(chdtri(freedom, _FALSE_ALARM))):
+    if not freedom > 0 or square <= (by_chance := float(chdtri(freedom, FALSE_ALARM))):
         return 1.0
     y, x = lattice.wavenumbers
     return np.asarray(np.exp((1.0 - by_chance / square) * levels.level)[_sectors(y[:, None], x)])
