@@ -169,8 +169,7 @@ class _Anisotropy:
     def of(cls, fit: AzimuthFit) -> _Anisotropy:
         """Convert the two components of the log ratio, with their covariance, to ratio and azimuth."""
         uv, nan = fit.uv, np.nan
-        low, hurst, high = fit.found.interval()
-        error = (high - low) / (2.0 * NORMAL)
+        _, hurst, _, error = fit.found.interval()
         isotropy_p_value, anisotropy_p_value = fit.p_values
         azimuth = float(np.degrees(0.5 * np.arctan2(uv[1], uv[0])) % 180.0)
         size = float(np.hypot(*uv))

@@ -42,7 +42,7 @@ from fractalcontact.dimensions._mode_bins import (
     log_means,
     make_bins,
 )
-from fractalcontact.dimensions._records import CONSTANT, NORMAL, Estimate, plane, smooth, undefined
+from fractalcontact.dimensions._records import CONSTANT, Estimate, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     HIGHEST,
     HURST,
@@ -219,8 +219,8 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     levels = log_means(np.maximum(mean, 1e-300), degrees)
     shares, centres, deviations = model.components(*levels, windows.new_share, scales is not None)
     for place, centre, deviation in zip(chosen, centres, deviations, strict=True):
-        low, hurst, high = mixture_interval(shares, centre, deviation)
-        record = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high)
+        low, hurst, high, error = mixture_interval(shares, centre, deviation)
+        record = Estimate(hurst, error, low, high)
         wide = f"the heights of a window do not determine its exponent: {low:.2f} to {high:.2f} is as likely"
         records[place] = record.without_interval(wide) if high - low > WIDEST else record
     return [record or undefined(NO_MODES) for record in records]

@@ -4,7 +4,8 @@
 2. Modes that the edges, a filter or single waves dominate are left out; the lay is divided out; gaps are
    filled, and their effect on the power is corrected.
 3. The bins of the modes that are left have one posterior (`_spectral_posterior`): its median is the
-   estimate, the shortest interval with a probability of 95 % the interval.
+   estimate, its standard deviation the standard error, the shortest interval with a probability of 95 % the
+   interval.
 
 Whole periodic surfaces have Fourier modes; profiles are the case of one axis.
 """
@@ -318,7 +319,7 @@ def _estimate(
     psf: float | None,
 ) -> Estimate:
     """Return the record of a posterior, with what was found in words."""
-    low, middle, high = found.interval()
+    low, middle, high, deviation = found.interval()
     discrepancy = found.most_probable[1]
     dx = surface.spacing[1]
     inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx
@@ -329,7 +330,7 @@ def _estimate(
     height = amplitude * unit * found.mean(NOISE, "is_noisy") if is_noisy else math.nan
     estimate = Estimate(
         hurst=middle,
-        standard_error=(high - low) / 3.92,
+        standard_error=deviation,
         ci_low=low,
         ci_high=high,
         scale_min=float(inside.min()),

@@ -66,7 +66,7 @@ def test_shares_sum_to_one():
     kinds = {id(kind): kind for kind in found.discrepancies}  # a kind stands at each of its maxima
     assert sum(kind.prior for kind in kinds.values()) == pytest.approx(1.0)
     assert sum(np.exp(hypothesis.log_prior) for hypothesis in found.hypotheses) == pytest.approx(1.0)
-    low, median, high = found.interval()
+    low, median, high, _ = found.interval()
     assert low < median < high
 
 
@@ -101,16 +101,20 @@ def test_interval_is_the_shortest_by_root_finding(name):
         u = brentq(lambda u: share @ norm.cdf((u - centre) / scale) - probability, -9.0, 9.0, xtol=1e-13)
         return sp.LOWEST + (sp.HIGHEST - sp.LOWEST) * norm.cdf(u)
 
-    low, median, high = sp.mixture_interval(share, centre, scale)
+    low, median, high, deviation = sp.mixture_interval(share, centre, scale)
     widths = [quantile(p + 0.95) - quantile(p) for p in np.linspace(1e-6, 0.05 - 1e-6, 401)]
     assert below(high) - below(low) == pytest.approx(0.95, abs=1e-3)
     assert high - low == pytest.approx(min(widths), rel=0.01)
     assert median == pytest.approx(quantile(0.5), abs=1e-3 * (high - low))
+    drawn = np.random.default_rng(1)
+    kind = drawn.choice(share.size, 200_000, p=share)
+    u = centre[kind] + scale[kind] * drawn.standard_normal(kind.size)
+    assert deviation == pytest.approx(np.std((sp.HIGHEST - sp.LOWEST) * norm.cdf(u)), rel=0.01)
     if name == "skewed":
         assert high - low < 0.97 * (quantile(0.975) - quantile(0.025))
 
 
 def test_joint_interval_of_one_surface_is_its_own():
     found = sp.posterior(bins_of(0.5))
-    low, _, high = found.interval()
+    low, _, high, _ = found.interval()
     assert sp.joint_interval([found]) == pytest.approx(found.interval(), abs=0.01 * (high - low))

@@ -21,7 +21,7 @@ import fractalcontact as fc
 
 HURST, SCATTER = 0.7, 0.03
 Path("scans").mkdir(exist_ok=True)
-rng = np.random.default_rng(36)
+rng = np.random.default_rng(35)
 for number in range(64):
     truth = fc.surfaces.fbm((80, 80), 1e-5, hurst=rng.normal(HURST, SCATTER), rms_increment=1e-6, rng=number)
     measured = gaussian_filter(truth.values, 0.7, mode="nearest")[8:-8, 8:-8]
