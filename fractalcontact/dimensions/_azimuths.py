@@ -48,6 +48,7 @@ from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+LARGEST = 2048  # points along each axis: 5 s of processor time and .8 GB
 LARGEST_LOG_RATIO = math.log(16.0)  # of the metric: lags in the tables grow with the square of the ratio
 SECTORS = 16  # of the half-circle
 # cos^16 of the angle to an azimuth weights the modes, as many as a sector of 25 degrees either side. Of

@@ -258,11 +258,11 @@ def _crossing(slope: Callable[[float], float]) -> float:
     """Return H at which a slope vanishes; beyond the range of expected curves that of its tangent does."""
     low, high = slope(LOWEST), slope(HIGHEST)
     if low * high < 0.0:
-        ends = np.array([LOWEST, HIGHEST])
+        start, end = LOWEST, HIGHEST
         for _ in range(20):  # to 1e-6; a root finder of scipy.optimize takes .13 s to import
-            middle = float(ends.mean())
-            ends[int(slope(middle) * low <= 0.0)] = middle
-        return float(ends.mean())
+            middle = 0.5 * (start + end)
+            start, end = (middle, end) if slope(middle) * low > 0.0 else (start, middle)
+        return 0.5 * (start + end)
     end, value = (LOWEST, low) if abs(low) < abs(high) else (HIGHEST, high)
     return end - value * 2.0 * STEP / (slope(end + STEP) - slope(end - STEP))
 

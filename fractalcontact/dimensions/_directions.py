@@ -15,6 +15,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._azimuths import (
     IMPROBABLE,
+    LARGEST,
     LARGEST_LOG_RATIO,
     NO_METRIC,
     AzimuthFit,
@@ -38,6 +39,7 @@ from fractalcontact.dimensions._surface_input import (
     Surface,
     check_scales,
     check_surface,
+    middle_slices,
     read_scales,
     read_surfaces,
 )
@@ -45,7 +47,7 @@ from fractalcontact.dimensions._waves import without_waves
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-SMALLEST, LARGEST = 16, 2048  # points along each axis: 5 s of processor time and .8 GB
+SMALLEST = 16  # points along each axis
 _DIRECTIONS = 8
 _BY_DIRECTION = ("hurst", "fitted_hurst", "standard_error", "ci_low", "ci_high", "rms_increment")
 _OF_SURFACE = (
@@ -139,8 +141,8 @@ def directions(
     ... )
     ratio 2.0 along 30 degrees
     """
-    middle = {dim: slice(max(0, n - LARGEST) // 2, (n + LARGEST) // 2) for dim, n in surface.sizes.items()}
-    surface = surface.isel({dim: middle[dim] for dim in surface.dims[-2:]})
+    cuts = middle_slices(surface.shape[-2:], LARGEST)
+    surface = surface.isel(dict(zip(surface.dims[-2:], cuts, strict=True)))
     surfaces = read_surfaces(surface)
     window = surfaces[0].resolved(read_scales(scales))
     azimuths = np.arange(_DIRECTIONS) * 180.0 / _DIRECTIONS
@@ -169,7 +171,8 @@ class _Anisotropy:
     def of(cls, fit: AzimuthFit) -> _Anisotropy:
         """Convert the two components of the log ratio, with their covariance, to ratio and azimuth."""
         uv, nan = fit.uv, np.nan
-        _, hurst, _, error = fit.found.interval()
+        interval = fit.found.interval()
+        hurst, error = interval.median, interval.deviation
         isotropy_p_value, anisotropy_p_value = fit.p_values
         azimuth = float(np.degrees(0.5 * np.arctan2(uv[1], uv[0])) % 180.0)
         size = float(np.hypot(*uv))

@@ -59,6 +59,7 @@ from fractalcontact.dimensions._surface_input import (
     between,
     check_scales,
     check_surface,
+    middle_slices,
     read_scales,
     read_surfaces,
 )
@@ -228,9 +229,7 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
 
 def _middle(surface: xr.DataArray) -> Surface | None:
     """Return the middle of a surface, or all of one in memory where little of its middle was observed."""
-    cuts = {
-        d: slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for d, n in surface.sizes.items()
-    }
+    cuts = dict(zip(surface.dims, middle_slices(surface.shape, LARGEST_CROP), strict=True))
     for part in (surface.isel(cuts).compute(), None if has_blocks(surface) else surface):
         if part is not None and np.count_nonzero(np.isfinite(part.values)) >= FEWEST:
             return read_surfaces(part)[0]

@@ -177,8 +177,8 @@ def mixture_interval(
     """Return the interval of H of a sum of normal distributions of u.
 
     Each round takes `points` where the one before expects equal steps of a normal distribution. Four find a
-    deviation of .0005 of u. The intervals of 150 surfaces of 34 kinds were up to .01 wider than the
-    shortest (.0005 in the median).
+    deviation of .0005 of u. The intervals of 150 surfaces of 34 kinds were up to 1 % wider than the
+    shortest (.05 % in the median).
     """
     from scipy.special import ndtr
 
@@ -224,7 +224,7 @@ def _shortest(u: Array, below: Array, probability: float = 0.95) -> Interval:
         second, first, _ = np.polyfit(starts[near] - low, (ends - starts)[near], 2)
         low += np.clip(-0.5 * first / second, *(starts[near] - low)[[0, 2]]) if second > 0.0 else 0.0
     high = np.interp(np.interp(low, hurst, below) + probability, below, hurst)
-    # but for 3e-5 at both ends
+    # without the outermost 3e-5 at each end, whose cells are wide
     middle, share = 0.5 * (hurst[2:-1] + hurst[1:-2]), np.diff(below[1:-1])
     deviation = math.sqrt(share @ np.square(middle - share @ middle / share.sum()) / share.sum())
     return Interval(float(low), float(np.interp(0.5, below, hurst)), float(high), deviation)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -361,6 +361,11 @@ def _check_squares(problems: Problems, stack: Array) -> None:
             "whose squares are numbers"
         )
         problems.add("surface", expected, f"a range of about {max(units):.0e} m")
+
+
+def middle_slices(shape: Iterable[int], edge: int) -> tuple[slice, ...]:
+    """Return the slices of the middle `edge` points along each axis, or of all where there are fewer."""
+    return tuple(slice(max(0, n - edge) // 2, (n + edge) // 2) for n in shape)
 
 
 def _height_range(heights: Array) -> tuple[float, float]:

@@ -23,7 +23,12 @@ from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._spectrum import without_trend
-from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
+from fractalcontact.dimensions._surface_input import (
+    Surface,
+    check_surface,
+    middle_slices,
+    read_surfaces,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -194,7 +199,7 @@ def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
     the heights are then returned as they are. Blocks of equal heights are periodic, but no waves.
     """
     shape = surface.shape
-    crop = tuple(slice(max(0, n - LARGEST_CROP) // 2, (n + LARGEST_CROP) // 2) for n in shape)
+    crop = middle_slices(shape, LARGEST_CROP)
     is_part = max(shape) > LARGEST_CROP
     is_periodic = all(surface.grid.periodic) and not is_part
     part = without_trend(surface.heights[crop], plane=not is_periodic)
