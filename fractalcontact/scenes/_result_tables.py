@@ -89,13 +89,17 @@ def rows(title: str, over: tuple[str, ...], *columns: Column, **options: Any) ->
 
 @dataclass(frozen=True)
 class ResultTable:
-    """A table as text: the head and cells of the key of each row, and those of its values."""
+    """A table as text: the head and cells of the key of each row, and those of its values.
+
+    The short summary shows the columns with the heads `on_screen`.
+    """
 
     title: str
     key_heads: tuple[str, ...]
     keys: tuple[tuple[str, ...], ...]
     heads: tuple[str, ...]
     cells: tuple[tuple[str, ...], ...]
+    on_screen: tuple[str, ...]
     remarks: tuple[str, ...] = ()
 
     @property
@@ -129,8 +133,8 @@ class ResultTable:
         return replace(self, key_heads=heads, keys=keys, cells=cells)
 
 
-def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = False) -> ResultTable | None:
-    """Return the table of a result, or its columns for the screen; None where the result has none of them."""
+def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | None:
+    """Return the table of a result; None where the result has none of its columns."""
     dims = [dim for dim in rows.over if dim in data.dims]
     dims = dims[:1] if rows.first_dim else dims
     keys = dims or [dim for dim in rows.over if dim in data.coords][:1]
@@ -140,8 +144,9 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = 
         data.isel(dict(zip(dims, place, strict=True)))
         for place in np.ndindex(*(data.sizes[dim] for dim in dims))
     ]
-    shown = [column for column in rows.columns if column.screen or not screen]
-    columns = {column.head: cells for column in shown if (cells := _cells(column, data, states)) is not None}
+    columns = {
+        column.head: cells for column in rows.columns if (cells := _cells(column, data, states)) is not None
+    }
     if not columns or not states:
         return None
     key_heads, key_cells = [], []
@@ -153,9 +158,12 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset, *, screen: bool = 
     if has_load and are_one(finite(data["nominal_pressure"])):
         key_heads[0] += f", at {amount(data['nominal_pressure'])}"
     table_keys = tuple(zip(*key_cells, strict=True)) if key_cells else ((),) * len(states)
-    remarks = () if screen else tuple(rows.remarks(tree, data))
     rows_of_cells = tuple(zip(*columns.values(), strict=True))
-    return ResultTable(rows.title, tuple(key_heads), table_keys, tuple(columns), rows_of_cells, remarks)
+    on_screen = tuple(column.head for column in rows.columns if column.screen and column.head in columns)
+    remarks = tuple(rows.remarks(tree, data))
+    return ResultTable(
+        rows.title, tuple(key_heads), table_keys, tuple(columns), rows_of_cells, on_screen, remarks
+    )
 
 
 def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:

@@ -255,7 +255,7 @@ def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
         count = plain(root[f"{name}_scans"], 0)
         cells.append((mean, "none" if low == "-" else f"{low} to {high}", scatter, count))
     heads = ("mean", "95 % interval", "scatter between scans", "scans")
-    yield ResultTable("means over the scans", ("quantity",), tuple(keys), heads, tuple(cells))
+    yield ResultTable("means over the scans", ("quantity",), tuple(keys), heads, tuple(cells), heads)
     has_failed = bool((overview["status"] != "done").any())
     rows = _ROWS if has_failed else replace(_ROWS, columns=_ROWS.columns[:-1])
     table = table_of(rows, tree, overview)

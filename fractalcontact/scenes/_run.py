@@ -267,9 +267,8 @@ def _page_and_summary(tree: xr.DataTree) -> tuple[dict[str, Any], Summary]:
 
 def _text(tree: xr.DataTree, whole: Summary | None, *, verbose: bool) -> str:
     """Return the summary as text, from what the report has computed of it."""
-    if verbose:
-        return verbose_text(summary_of(tree) if whole is None else whole)
-    return screen_text(tree, None if whole is None else whole.caveats)
+    whole = whole or summary_of(tree)
+    return verbose_text(whole) if verbose else screen_text(whole)
 
 
 def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) -> None:

@@ -59,13 +59,14 @@ def summary(tree: xr.DataTree, *, verbose: bool = False) -> str:
     with Problems("fractalcontact.scenes.summary") as problems:
         problems.tree("tree", tree)
         problems.boolean("verbose", verbose)
-    return verbose_text(summary_of(tree)) if verbose else screen_text(tree)
+    whole = summary_of(tree)
+    return verbose_text(whole) if verbose else screen_text(whole)
 
 
 def summary_of(tree: xr.DataTree) -> Summary:
     """Return all there is to say of a study."""
     title = str(tree.attrs.get("title", tree.name or "result"))
-    return Summary(title, facts(tree), list(_tables(tree, screen=False)), caveats(tree), stage_rows(tree))
+    return Summary(title, facts(tree), list(_tables(tree)), caveats(tree), stage_rows(tree))
 
 
 def facts(tree: xr.DataTree) -> list[str]:
@@ -92,20 +93,20 @@ def _openings(tree: xr.DataTree) -> Iterator[str]:
     yield f"aperture: mean {length(mean)}, smallest {length(smallest)}" + (lifted if smallest < 0.0 else "")
 
 
-def _tables(tree: xr.DataTree, *, screen: bool) -> Iterator[ResultTable]:
+def _tables(tree: xr.DataTree) -> Iterator[ResultTable]:
     """Yield the table of every stage that the study has a result of; of many scans first a row for each."""
     of_scans = list(scan_tables(tree))
     yield from of_scans
     if of_scans:  # each has a page of its own for the rest
         return
-    yield from stage_tables(tree, STAGES, screen=screen)
+    yield from stage_tables(tree, STAGES)
 
 
-def stage_tables(tree: xr.DataTree, names: Iterable[str], *, screen: bool = False) -> Iterator[ResultTable]:
-    """Yield the table of each of the stages that the study has a result of, or its columns for the screen."""
+def stage_tables(tree: xr.DataTree, names: Iterable[str]) -> Iterator[ResultTable]:
+    """Yield the table of each of the stages that the study has a result of."""
     for name in names:
         rows, data = STAGES[name].rows, group_of(tree, name)
-        made = None if rows is None or data is None else table_of(rows, tree, data, screen=screen)
+        made = None if rows is None or data is None else table_of(rows, tree, data)
         if made is not None:
             yield made
 
@@ -135,18 +136,17 @@ def _fit(one: ResultTable, other: ResultTable) -> bool:
     )
 
 
-def screen_text(tree: xr.DataTree, limits: list[str] | None = None, lines: int = 36, most: int = 3) -> str:
-    """Return the summary in so many lines: results first, then at most `most` of the caveats.
+def screen_text(whole: Summary, lines: int = 36, most: int = 3) -> str:
+    """Return a summary in so many lines: results first, then at most `most` of the caveats.
 
     A command adds what it has written, 40 lines in all.
     """
-    tables = joined_tables(list(_tables(tree, screen=True)))
-    notes = caveats(tree) if limits is None else limits
-    ends = [str(Note(caveat, indent=0)) for caveat in notes[:most]]
-    ends += [f"caveats left out: {len(notes) - most}; {MORE}"] if len(notes) > most else []
-    title = str(tree.attrs.get("title", tree.name or "result"))
+    tables = joined_tables([each.selected(each.on_screen) for each in whole.tables if each.on_screen])
+    ends = [str(Note(caveat, indent=0)) for caveat in whole.caveats[:most]]
+    left_out = len(whole.caveats) - most
+    ends += [f"caveats left out: {left_out}; {MORE}"] if left_out > 0 else []
     single = [str(_as_line(each)) for each in tables if not each.key_heads]
-    head = "\n".join([title, *(str(Note(fact, indent=0)) for fact in facts(tree)), *single])
+    head = "\n".join([whole.title, *(str(Note(fact, indent=0)) for fact in whole.facts), *single])
     foot = ["\n".join(ends)] if ends else []
     left = lines - sum(part.count("\n") + 2 for part in [head, *foot])
     return "\n\n".join([head, *_fitted([each for each in tables if each.key_heads], left), *foot])
