@@ -13,7 +13,7 @@ import signal
 import threading
 import time
 import uuid
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -127,13 +127,15 @@ def run_tasks(
     workers: Workers | None = None,
     *,
     points: int,
+    wide: Collection[K] = (),
     meanwhile: Callable[[], object] | None = None,
 ) -> Generator[tuple[K, R], None, None]:
     """Yield key and result of every task as it finishes; a task that a stop cut short is left out.
 
     Without workers a copy of this process shares the tasks of a surface of few `points`, where that is worth
-    it by their number and the points, or by the time of the last task. This process does what is needed
-    later, `meanwhile`, before it waits for the copy.
+    it by their number and the points, or by the time of the last task. Each process takes half of the
+    threads, but all of them for a task that is `wide`: whose threads do not wait for each other. This process
+    does what is needed later, `meanwhile`, before it waits for the copy.
     """
     if workers is not None:
         yield from _run_on_workers(tasks, store, stop, workers)
@@ -148,10 +150,10 @@ def run_tasks(
         expected = (time.perf_counter() - start) * len(left)
         if result is not None:
             yield key, result
-    keys, half = list(left), resources.thread_count() // 2
+    keys, threads = list(left), resources.thread_count()
 
     def run_one(place: int) -> R | None:
-        with resources.limit(half):
+        with resources.limit(threads if keys[place] in wide else threads // 2):
             return left[keys[place]](store, stop)
 
     for place, result in calls_in_two_processes(run_one, len(keys), meanwhile):

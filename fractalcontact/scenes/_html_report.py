@@ -413,7 +413,7 @@ def _value(scalar: xr.DataArray) -> str:
 
 def _picture_file(path: Path) -> tuple[str, bytes]:
     """Return the name of a picture and its content as WebP, which is smaller than PNG."""
-    from PIL import Image
+    from PIL import Image, WebPImagePlugin  # noqa: F401  for a format it does not know Pillow loads all
 
     content = io.BytesIO()
     with reading(WHERE, path), Image.open(path) as picture:

@@ -172,7 +172,13 @@ class Study:
         # closed after an error too: parts that a copy of this process has begun are kept
         draws = self.store.folder is not None and self.scene.want.figures
         running = run_tasks(
-            tasks, self.store, stop, workers, points=self._points, meanwhile=_load_plotting if draws else None
+            tasks,
+            self.store,
+            stop,
+            workers,
+            points=self._points,
+            wide=[(stage.name, 0) for stage in stages if stage.whole_path],  # a thread for each map
+            meanwhile=_load_plotting if draws else None,
         )
         with closing(running) as finished:
             bar = track(finished, show, self.scene.name, unit="part", total=len(tasks))
