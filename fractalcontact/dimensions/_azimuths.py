@@ -24,9 +24,14 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.spectra import half_wavenumbers
-from fractalcontact.dimensions._diagnosis import rounding_noise
-from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, mixture, spread_nodes
-from fractalcontact.dimensions._metric_spectrum import MetricSpectrum, gaussian_tables, metric_of
+from fractalcontact.dimensions._first_fit import FirstFit
+from fractalcontact.dimensions._gaussian_mixture import Bins, mixture, spread_nodes
+from fractalcontact.dimensions._metric_spectrum import (
+    LARGEST_LOG_RATIO,
+    MetricSpectrum,
+    gaussian_tables,
+    metric_of,
+)
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
@@ -35,21 +40,20 @@ from fractalcontact.dimensions._mode_bins import (
     fill,
     joined_classes,
     log_means,
-    rms_increment,
 )
 from fractalcontact.dimensions._spectral_posterior import (
     HURST,
     NOISE,
     SPREAD,
+    Known,
     Posterior,
     posterior,
 )
-from fractalcontact.dimensions._surface_input import Scales, Surface, between
+from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LARGEST = 2048  # points along each axis: 5 s of processor time and .8 GB
-LARGEST_LOG_RATIO = math.log(16.0)  # of the metric: lags in the tables grow with the square of the ratio
 SECTORS = 16  # of the half-circle
 # cos^16 of the angle to an azimuth weights the modes, as many as a sector of 25 degrees either side. Of
 # exponents .4 and .8 that were built in it finds .90 and .45; cos^8 .85 and .79, cos^24 .92 and .29
@@ -59,6 +63,9 @@ _TAPERED = 0.05  # share of an edge over which the taper rises
 _LEAK = 0.25  # power of the edges over that of a mode, either way, from which on neighbours are correlated
 _EMPTY = 1e-14  # of the largest level: rounding
 _CUT_OFF = 1e-4  # power of a ring over that an octave before; a blur of a spacing has 4e-5
+# Prior deviation of u and v, log 2: 95 % of ratios are below 5.5. Without a prior the azimuths of a few long
+# waves of white noise make a blurred lay as probable as the noise (3 of 4 surfaces)
+_PRIOR_LOG_RATIO = math.log(2.0)
 _POSSIBLE = 1e-3  # probability of a hypothesis whose azimuths are looked at
 _ROUNDS = 12  # of a fit, 2 to 6 of which were needed
 IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
@@ -256,16 +263,17 @@ class Classes:
         return [(each - here) / step for each in there]
 
     def fit_metric(self, spectrum: MetricSpectrum, uv: Array) -> tuple[Array, Array, float]:
-        """Return the components of the log ratio, by Fisher scoring, their covariance, and the deviance.
+        """Return the components of the log ratio, by Fisher scoring, their covariance, and -2 log evidence.
 
-        The deviance is that of the classes from the mean of their ring.
+        The evidence is that of the classes about the mean of their ring, over the prior of the log ratio.
         """
         weight = self.count * self.information
         for _ in range(_ROUNDS):
             spectrum = replace(spectrum, metric=metric_of(*uv))
             relative = self.relative(spectrum)
             columns = self.centred(self.metric_columns(spectrum, uv, relative))
-            covariance = np.linalg.pinv((weight[:, None] * columns).T @ columns)
+            information = (weight[:, None] * columns).T @ columns
+            covariance = np.linalg.pinv(information)
             step = covariance @ (columns.T @ (weight * self.excess(relative)))
             uv = uv + step / max(1.0, math.hypot(*step))
             uv = uv / max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)
@@ -273,6 +281,8 @@ class Classes:
                 break
         excess = self.excess(self.relative(replace(spectrum, metric=metric_of(*uv))))
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
+        over = np.eye(2) + _PRIOR_LOG_RATIO**2 * information
+        deviance += uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
         return uv, covariance, float(deviance)
 
     @property
@@ -291,12 +301,12 @@ class Classes:
         total = np.bincount(self.ring, share)
         return self.by_ring(logs, share), 1.0 / total, share / total[self.ring]
 
-    def bins(self, spectrum: MetricSpectrum, *, is_pilot: bool) -> Bins:
+    def bins(self, spectrum: MetricSpectrum) -> Bins:
         """Return the bins of the posterior: the rings."""
         modes = self.modes
         edges = modes.shape[0] * modes.dy, float(modes.shape[1])
         t, extent = mixture(max(edges)), max(edges)
-        spreads, nodes = spread_nodes(min(edges), is_pilot=is_pilot)
+        spreads, nodes = spread_nodes(min(edges), is_pilot=False)
         level, variance, share = self.levels()
         weight = np.repeat(share / self.size, self.size) / self._before
         starts = self.first[np.flatnonzero(np.diff(self.ring, prepend=-1))]
@@ -393,8 +403,6 @@ class AzimuthFit:
     p_values : tuple of float
         That an isotropic surface, and one of this metric, differs as much between azimuths; NaN where
         the filling of gaps has made the short waves.
-    scale : float
-        Rms increment of the heights, in scaled heights.
     """
 
     classes: Classes
@@ -404,30 +412,22 @@ class AzimuthFit:
     bins: Bins
     found: Posterior
     p_values: tuple[float, float]
-    scale: float
 
 
 def fit_azimuths(
-    surface: Surface, scales: Scales, *, spread: float | None = None, noise: float | None = None
+    first: FirstFit, scales: Scales, known: Known, *, least_log_ratio: float = 0.0
 ) -> AzimuthFit | None:
-    """Fit the waves of a surface by azimuth; None if they are too few.
+    """Fit the waves of a surface, or of its middle, by azimuth.
 
-    `scales`: wavelengths in x spacings, whose exponent is estimated as they are. `spread`: of a known blur,
-    in x spacings. `noise`: height of known noise, in the unit of the heights.
+    None if they are too few, or if their lengths differ by less than `least_log_ratio`. `scales`: wavelengths
+    that count, in x spacings.
     """
-    observed = np.isfinite(surface.heights)
-    is_complete = bool(observed.all())
-    scale = rms_increment(surface.heights)
-    heights = fill((surface.heights - surface.heights[observed].mean()) / scale)
-    dy = surface.plane_spacing[0]
-    modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_complete and all(surface.grid.periodic))
+    middle = middle_slices(first.heights.shape, LARGEST)
+    observed, heights = np.isfinite(first.heights[middle]), first.filled[middle]
+    dy = first.lattice.spacing[0]
+    is_periodic = first.lattice.periodic and heights.shape == first.heights.shape
+    modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_periodic)
     power = modes.power(heights)
-    if scales is not None:
-        spread, noise = spread or 0.0, noise or 0.0
-    background = rounding_noise(surface) / scale
-    known = math.hypot(noise / scale, background) if noise else 0.0
-    options: dict[str, Any] = {"background": background, "is_window": scales is not None}
-    options |= {"spread": spread, "noise": None if noise is None else noise > 0.0}
     low, high = (0.0, np.inf) if scales is None else scales
     band = max(low, _shortest(modes, power)), high
 
@@ -435,20 +435,20 @@ def fit_azimuths(
         classes = Classes(modes, power, spectrum, band)
         if classes.number_of_modes < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
             return None
-        if not is_complete:
+        if not first.is_complete:
             classes.corrected(*_filled_levels(classes, observed))
         return classes
 
     def most_probable(
-        classes: Classes, spectrum: MetricSpectrum, uv: Array, is_pilot: bool
+        classes: Classes, spectrum: MetricSpectrum, uv: Array
     ) -> tuple[Bins, Posterior, MetricSpectrum, Array, Array]:
         """Return bins and posterior, and the spectrum with its log ratio and covariance.
 
         The probability of a hypothesis is multiplied by that of the azimuths, with a metric of its own.
         """
-        pilot = float(spectrum.theta[SPREAD]) if spread is None else 0.0
-        bins = replace(classes.bins(spectrum, is_pilot=is_pilot), noise=known)
-        found = posterior(bins, pilot_spread=pilot, is_pilot=is_pilot, **options)
+        spectrum = replace(spectrum, metric=metric_of(*uv))
+        bins = replace(classes.bins(spectrum), noise=known.total_noise)
+        found = posterior(bins, known, pilot_spread=float(spectrum.theta[SPREAD]))
         fits, share = [], np.zeros_like(found.share)
         for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE):
             theta = found.theta[m, int(np.argmax(found.share[m]))]
@@ -461,25 +461,22 @@ def fit_azimuths(
         spectrum, uv, covariance, *_ = max(fits, key=lambda fit: float(found.share[fit[4]].sum()))
         return bins, found, replace(spectrum, metric=metric_of(*uv)), uv, covariance
 
-    uv = np.zeros(2)
-    spectrum = MetricSpectrum(np.array([0.5, 0.0, 0.0, 0.0, 0.0, 1.0]), ALIASED, metric_of(*uv), dy)
-    for rounds in range(_ROUNDS):
+    uv = first.log_ratio
+    spectrum = MetricSpectrum(first.theta, first.form, metric_of(*uv), dy)
+    for _ in range(_ROUNDS):
         some = classes_of(spectrum)
         if some is None:
             return None
         classes, before = some, uv
-        if rounds > 0:
-            uv, covariance, _ = classes.fit_metric(spectrum, uv)
-            spectrum = replace(spectrum, metric=metric_of(*uv))
-            if math.hypot(*(uv - before)) > _SAME and rounds < _ROUNDS - 1:
-                continue
-        before = uv
-        bins, found, spectrum, uv, covariance = most_probable(classes, spectrum, uv, rounds == 0)
+        uv, covariance, _ = classes.fit_metric(spectrum, uv)
+        if math.hypot(*uv) < least_log_ratio:
+            return None
+        bins, found, spectrum, uv, covariance = most_probable(classes, spectrum, uv)
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
-        if rounds > 0 and math.hypot(*(uv - before)) < _SAME and np.ptp(change) < 0.7:
+        if math.hypot(*(uv - before)) < _SAME and np.ptp(change) < 0.7:
             break
     p_values = classes.test(spectrum, None), classes.test(spectrum, uv)
-    if not is_complete and not found.most_probable[1].inside.all():
+    if not first.is_complete and not found.most_probable[1].inside.all():
         # beyond a cut the waves are those of the filling, which know the axes
         p_values = math.nan, math.nan
     if p_values[1] < IMPROBABLE:  # each azimuth is compared with all of them
@@ -488,9 +485,9 @@ def fit_azimuths(
         again = classes_of(spectrum)
         if again is not None:
             classes = again
-            bins, found, spectrum, *_ = most_probable(classes, spectrum, np.zeros(2), False)
+            bins, found, spectrum, *_ = most_probable(classes, spectrum, np.zeros(2))
             spectrum = replace(spectrum, metric=isotropic)
-    return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values, scale)
+    return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values)
 
 
 def _filled_levels(classes: Classes, observed: Array) -> tuple[Array, Array]:

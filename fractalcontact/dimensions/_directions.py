@@ -16,14 +16,14 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._azimuths import (
     IMPROBABLE,
     LARGEST,
-    LARGEST_LOG_RATIO,
     NO_METRIC,
     AzimuthFit,
     fit_azimuths,
 )
-from fractalcontact.dimensions._diagnosis import diagnose
+from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
+from fractalcontact.dimensions._first_fit import first_fit
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
-from fractalcontact.dimensions._metric_spectrum import squared_length
+from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, squared_length
 from fractalcontact.dimensions._records import (
     CONSTANT,
     NORMAL,
@@ -33,7 +33,7 @@ from fractalcontact.dimensions._records import (
     smooth,
     undefined,
 )
-from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST
+from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, Known
 from fractalcontact.dimensions._surface_input import (
     Scales,
     Surface,
@@ -252,10 +252,13 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
         if not np.diff(surface.heights, axis=("y", "x").index(dim)).any():
             return _of_ridges(surface, dim, ridge, azimuths, scales)
     surface, note = without_waves(surface)
-    dx = surface.spacing[1]
+    dx, known = surface.spacing[1], Known.of(scales is not None)
     lengths = None if scales is None else (scales[0] / dx, scales[1] / dx)
-    fit = fit_azimuths(surface, lengths)
-    if fit is None:
+    first = first_fit(surface, known.spread)
+    fit = None
+    if first is not None:
+        fit = fit_azimuths(first, lengths, known.over(1.0, rounding_noise(surface) / first.scale))
+    if first is None or fit is None:
         record = (smooth() if scales is None else undefined(NO_MODES)).limited()
         return _Directional([record] * azimuths.size, None, record.note)
     anisotropy = _Anisotropy.of(fit)
@@ -266,7 +269,8 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
         reason = NO_METRIC
     every, *each = fit.classes.along(fit.spectrum, azimuths)
     records = [
-        _along(fit, a, along, every, surface.unit, reason) for a, along in zip(azimuths, each, strict=True)
+        _along(fit, a, along, every, first.scale * surface.unit, reason)
+        for a, along in zip(azimuths, each, strict=True)
     ]
     records = [replace(record, note=joined(note, record.note)).limited() for record in records]
     return _Directional(records, anisotropy, anisotropy.reason)
@@ -302,7 +306,7 @@ def _along(fit: AzimuthFit, azimuth: float, along: Array, every: Array, unit: fl
     low, hurst, high = np.interp((0.025, 0.5, 0.975), below, places).tolist()
     angle = np.radians(azimuth)
     lag = float(squared_length(fit.spectrum.metric, np.sin(angle), np.cos(angle)))
-    increment = fit.scale * float(np.sqrt(np.exp(along[0]) * lag**hurst))
+    increment = float(np.sqrt(np.exp(along[0]) * lag**hurst))
     estimate = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high, rms_increment=increment * unit)
     if not reason and high - low > WIDEST:
         ends = f"{max(low, 0.0):.2f} to {min(high, 1.0):.2f}"

@@ -13,6 +13,7 @@ import xarray as xr
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
+from fractalcontact.dimensions._first_fit import first_fit
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
 from fractalcontact.dimensions._likelihood import fitted_modes, likelihood
 from fractalcontact.dimensions._records import NORMAL
@@ -173,7 +174,8 @@ def _record(surface: Surface, octaves: _Octaves) -> _Record:
     """Fit the octaves of one surface."""
     none = np.zeros(octaves.number, dtype=np.int64)
     undefined = [_PowerLaw()] * octaves.number
-    fit = None if surface.is_constant or surface.is_plane else fitted_modes(surface)
+    first = None if surface.is_constant or surface.is_plane else first_fit(surface)
+    fit = None if first is None else fitted_modes(first)
     if fit is None or not fit.keep.any():
         return _Record(undefined, none, _PowerLaw(), none > 0, (math.nan, math.nan), "")
     bins = fit.bins()

@@ -29,6 +29,7 @@ from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._diagnosis import resampling, rounding_noise
+from fractalcontact.dimensions._first_fit import FirstFit, first_fit
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, ModeFit, fitted_modes
 from fractalcontact.dimensions._mode_bins import (
@@ -49,6 +50,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     LOWEST,
     NOISE,
     SPREAD,
+    Known,
     Posterior,
     mixture_interval,
     posterior,
@@ -207,8 +209,11 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     is_plane = middle is not None and middle.is_plane
     if middle is not None:
         scales = middle.resolved(scales)
-    fit = None if middle is None or middle.is_constant or is_plane else fitted_modes(middle)
-    model = None if fit is None or middle is None else _Model.of(fit, windows.edges, middle, scales)
+    first = None if middle is None or middle.is_constant or is_plane else first_fit(middle)
+    fit = None if first is None else fitted_modes(first)
+    model = None
+    if middle is not None and first is not None and fit is not None:
+        model = _Model.of(middle, first, fit, windows.edges, scales)
     rows = [_spectra(model, surface, int(row), windows) for row in windows.rows]
     records = [record for row in rows for record in row[0]]
     chosen = np.flatnonzero([record is None for record in records])
@@ -218,7 +223,7 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
     degrees = 0.5 * model.lattice.degrees * model.count * share
     levels = log_means(np.maximum(mean, 1e-300), degrees)
-    shares, centres, deviations = model.components(*levels, windows.new_share, scales is not None)
+    shares, centres, deviations = model.components(*levels, windows.new_share)
     for place, centre, deviation in zip(chosen, centres, deviations, strict=True):
         low, hurst, high, error = mixture_interval(shares, centre, deviation)
         record = Estimate(hurst, error, low, high)
@@ -246,8 +251,7 @@ class _Model:
         Of the surface or its middle.
     unit : float
         Of heights, m.
-    background : float
-        See `hypotheses`.
+    known : Known
     lattice : Lattice
         Of a window.
     pilot : ndarray
@@ -261,7 +265,7 @@ class _Model:
 
     fit: ModeFit
     unit: float
-    background: float
+    known: Known
     lattice: Lattice
     pilot: Array
     order: Array
@@ -271,8 +275,11 @@ class _Model:
     expected: Array
 
     @classmethod
-    def of(cls, fit: ModeFit, edges: tuple[int, int], middle: Surface, scales: Scales) -> _Model | None:
+    def of(
+        cls, middle: Surface, first: FirstFit, fit: ModeFit, edges: tuple[int, int], scales: Scales
+    ) -> _Model | None:
         """Prepare the windows of a surface; None where too few of their modes count."""
+        known = Known.of(scales is not None).over(1.0, rounding_noise(middle) / first.scale)
         lattice = replace(fit.lattice, shape=edges, periodic=False)
         pilot, clean = (expected_power(lattice, fit.theta, fit.form, edges=edge) for edge in (True, False))
         sharp = fit.theta.copy()
@@ -286,8 +293,8 @@ class _Model:
         count = np.bincount(number[order])
         return cls(
             fit,
-            fit.scale * middle.unit,
-            rounding_noise(middle) / fit.scale,
+            first.scale * middle.unit,
+            known,
             lattice,
             pilot,
             order,
@@ -337,7 +344,6 @@ class _Model:
         level: Array,
         variance: Array,
         new_share: float,
-        is_window: bool,
         *,
         probability: float = 0.99,
         most: int = 64,
@@ -350,15 +356,7 @@ class _Model:
         """
         mean, scatter = _mean_of_windows(level, variance, self.bins.lnq, max(new_share, 1.0 / len(level)))
         bins = replace(self.bins, level=mean, variance=scatter)
-        spread = 0.0 if is_window else float(self.fit.theta[SPREAD])
-        found = posterior(
-            bins,
-            spread=0.0 if is_window else None,
-            noise=False if is_window else None,
-            background=self.background,
-            pilot_spread=spread,
-            is_window=is_window,
-        )
+        found = posterior(bins, self.known, pilot_spread=float(self.fit.theta[SPREAD]))
         order = np.argsort(-found.share.ravel())
         shares = found.share.ravel()[order]
         number = min(most, 1 + int(np.searchsorted(np.cumsum(shares), probability)))

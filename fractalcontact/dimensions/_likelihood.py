@@ -18,28 +18,23 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.regression import detrended
-from fractalcontact.base.spectra import window_weights
 from fractalcontact.base.units import quantity_text
-from fractalcontact.dimensions._azimuths import LARGEST, NO_METRIC, fit_azimuths
+from fractalcontact.dimensions._azimuths import NO_METRIC, fit_azimuths
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise, unevenness
+from fractalcontact.dimensions._first_fit import NEAR_ISOTROPY, FirstFit, first_fit, log_ratio
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
 from fractalcontact.dimensions._mode_bins import (
+    EMPTY,
     FALSE_ALARM,
     LEAST,
     LEAST_BINS,
-    TAPERED,
     clear_modes,
     expected_power,
-    fill,
     filling_ratio,
-    is_oblique,
     lay,
     levels_by_azimuth,
     make_bins,
-    rms_increment,
     single_waves,
-    stretch,
     whitened,
 )
 from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
@@ -50,11 +45,12 @@ from fractalcontact.dimensions._spectral_posterior import (
     LOWEST,
     NOISE,
     SPREAD,
+    Known,
     Posterior,
     posterior,
 )
-from fractalcontact.dimensions._surface_input import Scales, Surface, middle_slices
-from fractalcontact.dimensions._waves import LARGEST_CROP, without_waves
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
+from fractalcontact.dimensions._waves import without_waves
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -67,7 +63,6 @@ NO_MODES = (
 )
 WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
 _SEEN = 0.8  # probability from which on a nuisance is named
-_EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
 
 
 @dataclass(frozen=True)
@@ -77,10 +72,8 @@ class ModeFit:
     Attributes
     ----------
     lattice : Lattice
-    scale : float
-        Rms increment over one x spacing, in scaled heights: unit of the modes.
     power : ndarray
-        Squared modes, corrected for gaps and for the lay.
+        Squared modes, in squared rms increments, corrected for gaps and for the lay.
     pilot : ndarray
         Expected power of the first fit.
     keep : ndarray of bool
@@ -88,19 +81,15 @@ class ModeFit:
     information : float or ndarray
     theta : ndarray
     form : int
-    is_oblique : bool
-        The lay is oblique to the axes, and cosine modes do not know the sign of an azimuth.
     """
 
     lattice: Lattice
-    scale: float
     power: Array
     pilot: Array
     keep: Array
     information: Array | float
     theta: Array
     form: int
-    is_oblique: bool
 
     def bins(self, keep: Array | None = None) -> Bins:
         """Return the bins of the modes that count, or of some of them."""
@@ -120,16 +109,40 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
         return plane()
     surface, marks = without_waves(surface)
     window = surface.resolved(scales)
-    if window is not None:  # the exponent of these waves as they are
-        psf, noise = psf or 0.0, noise or 0.0
-    spread = None if psf is None else psf / surface.spacing[1]
-    fit = fitted_modes(surface, spread)
+    if window is not None:
+        window = window[0] / surface.spacing[1], window[1] / surface.spacing[1]
+    known = Known.of(window is not None, None if psf is None else psf / surface.spacing[1], noise)
+    first = first_fit(surface, known.spread)
+    if first is None:
+        return undefined(NO_MODES)
+    known = known.over(first.scale * surface.unit, rounding_noise(surface) / first.scale)
+    estimate = _of_azimuths(surface, first, window, known) if first.is_oblique else None
+    if estimate is None:
+        estimate = _of_modes(surface, first, window, known)
+    return replace(estimate, note=joined(marks, estimate.note))
+
+
+def _of_azimuths(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate | None:
+    """Return the estimate from Fourier modes, whose metric has any azimuth.
+
+    None if they are too few, or if their lengths hardly differ.
+    """
+    fit = fit_azimuths(first, window, known, least_log_ratio=NEAR_ISOTROPY)
+    if fit is None:
+        return None
+    has_metric = not fit.p_values[1] < FALSE_ALARM
+    estimate = _estimate(surface, first, fit.bins, fit.found, known)
+    lag = float(fit.spectrum.metric[1, 1])  # of one x spacing, squared
+    estimate = replace(estimate, rms_increment=estimate.rms_increment * lag ** (0.5 * estimate.hurst))
+    return estimate if has_metric or estimate.reason else estimate.without_interval(NO_METRIC)
+
+
+def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate:
+    """Return the estimate from cosine modes, or from the Fourier modes of a periodic surface."""
+    fit = fitted_modes(first)
     if fit is None:
         return undefined(NO_MODES)
-    keep = fit.keep
-    if window is not None:
-        wavelength = 2.0 * np.pi / fit.lattice.q * surface.spacing[1]
-        keep = keep & (wavelength >= window[0] * (1.0 - 1e-9)) & (wavelength <= window[1] * (1.0 + 1e-9))
+    keep = fit.keep & between(2.0 * np.pi / fit.lattice.q, window)
     number = int(np.count_nonzero(keep))
     if number < LEAST * LEAST_BINS and window is None and keep.size > 4 * LEAST * LEAST_BINS:
         return smooth()
@@ -140,89 +153,21 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
             else "that the edges of the surface do not dominate"
         )
         return undefined(f"{number} modes {what}, at least {LEAST * LEAST_BINS} are needed")
-    if fit.is_oblique and not fit.lattice.periodic:
-        turned = _of_azimuths(surface, fit, window, noise, psf)
-        if turned is not None:
-            return replace(turned, note=joined(marks, turned.note))
-    unit = fit.scale * surface.unit
-    background = rounding_noise(surface) / fit.scale
-    bins = fit.bins(keep)
-    known = 0.0 if not noise else math.hypot(noise / unit, background)
-    bins = replace(bins, noise=known)
-    found = posterior(
-        bins,
-        spread=spread,
-        noise=None if noise is None else noise > 0.0,
-        background=background,
-        is_window=window is not None,
-        pilot_spread=float(fit.theta[SPREAD]) if spread is None else 0.0,
-    )
-    estimate = _estimate(surface, fit, bins, found, window, unit, noise, psf)
-    return replace(estimate, note=joined(marks, estimate.note))
+    bins = replace(fit.bins(keep), noise=known.total_noise)
+    found = posterior(bins, known, pilot_spread=float(fit.theta[SPREAD]))
+    return _estimate(surface, first, bins, found, known)
 
 
-def _of_azimuths(
-    surface: Surface,
-    fit: ModeFit,
-    window: Scales,
-    noise: float | None,
-    psf: float | None,
-    *,
-    near_isotropy: float = 0.4,
-) -> Estimate | None:
-    """Return the estimate from Fourier modes, whose metric has any azimuth.
+def fitted_modes(first: FirstFit, corrections: int = 1) -> ModeFit | None:
+    """Return the modes of a surface; None if it has too few.
 
-    None if they are too few, or if no metric describes them and lengths hardly differ: a step, or lines of a
-    scanner, are not a lay. Of more than `LARGEST` points along an axis those in the middle are used.
-
-    Parameters
-    ----------
-    surface, fit, window, noise, psf
-    near_isotropy : float
-        Logarithm of the ratio of lengths up to which cosine modes serve under an oblique lay: with 1.5 to 1
-        all of 24 intervals hold H, with 2 to 1 at 15 degrees the rms error is .34 (256 x 256 points, H = .8).
+    `corrections` for a stretch and gaps: a second one moved no rms error by more than .0005.
     """
-    dx = surface.spacing[1]
-    azimuths = fit_azimuths(
-        surface.with_heights(surface.heights[middle_slices(surface.shape, LARGEST)]),
-        None if window is None else (window[0] / dx, window[1] / dx),
-        spread=None if psf is None else psf / dx,
-        noise=None if noise is None else noise / surface.unit,
-    )
-    if azimuths is None:
-        return None
-    has_metric = not azimuths.p_values[1] < FALSE_ALARM
-    if not has_metric and math.hypot(*azimuths.uv) < near_isotropy:
-        return None
-    unit = azimuths.scale * surface.unit
-    estimate = _estimate(surface, fit, azimuths.bins, azimuths.found, window, unit, noise, psf)
-    lag = float(azimuths.spectrum.metric[1, 1])  # of one x spacing, squared
-    estimate = replace(estimate, rms_increment=estimate.rms_increment * lag ** (0.5 * estimate.hurst))
-    return estimate if has_metric or estimate.reason else estimate.without_interval(NO_METRIC)
-
-
-def fitted_modes(surface: Surface, spread: float | None = None, corrections: int = 1) -> ModeFit | None:
-    """Return the modes of a surface and their first fit; None if it has too few.
-
-    `spread` is that of a known blur, in spacings. `corrections` for a stretch and gaps: a second one moved no
-    rms error by more than .0005.
-    """
-    heights = _without_rim(surface.heights)
-    observed = np.isfinite(heights)
-    is_complete = bool(observed.all())
-    is_periodic = all(surface.grid.periodic) and is_complete
-    lattice = Lattice((heights.shape[0], heights.shape[1]), surface.plane_spacing, is_periodic)
-    if min(heights.shape[-surface.axes :]) < 4:
-        return None
-    heights = heights - heights[observed].mean() if is_periodic else _without_plane(heights)
-    scale = rms_increment(heights)
-    heights /= scale
-    filled = fill(heights)
-    theta, form, ratio_of_lags, turned = _first_fit(filled, lattice, spread, is_complete)
-    lattice = replace(lattice, stretch=ratio_of_lags)
+    lattice, theta, form = first.lattice, first.theta, first.form
     if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
         return None
-    modes = lattice.power(filled)
+    observed, is_complete = np.isfinite(first.heights), first.is_complete
+    modes = lattice.power(first.filled)
     correction: Array | float = 1.0
     information: Array | float = 1.0
     for rounds in range(corrections, -1, -1):
@@ -235,7 +180,7 @@ def fitted_modes(surface: Surface, spread: float | None = None, corrections: int
             correction = filling_ratio(lattice, pilot, observed)
             information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
         power = modes if is_complete else modes / correction
-        keep &= power > _EMPTY * pilot
+        keep &= power > EMPTY * pilot
         if not keep.any():
             return None
         ratio = whitened(lattice, power, pilot, keep)
@@ -244,84 +189,29 @@ def fitted_modes(surface: Surface, spread: float | None = None, corrections: int
         level = lay(lattice, levels)
         if not rounds:
             break
-        ratio_of_lags = stretch(lattice, levels, unblurred)
-        if is_complete and lattice.stretch == ratio_of_lags == 1.0:
+        uv, _, share = log_ratio(levels, np.array([math.log(lattice.stretch), 0.0]), levels.slope(unblurred))
+        stretch = math.exp(share * uv[0])
+        if is_complete and lattice.stretch == stretch == 1.0:
             break
         if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
             bins = make_bins(lattice, power / level, pilot, keep, information=information, is_pilot=True)
-            hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
+            hypothesis, _, theta = posterior(bins, Known(first.spread), is_pilot=True).most_probable
             form = hypothesis.form
-        lattice = replace(lattice, stretch=ratio_of_lags)
-    information = information / unevenness(heights)
+        lattice = replace(lattice, stretch=stretch)
+    information = information / unevenness(first.heights)
     power /= level
-    return ModeFit(lattice, scale, power, pilot, keep, information, theta, form, turned)
+    return ModeFit(lattice, power, pilot, keep, information, theta, form)
 
 
-def _first_fit(
-    heights: Array, lattice: Lattice, spread: float | None, is_complete: bool
-) -> tuple[Array, int, float, bool]:
-    """Return theta, form, stretch, and whether the lay is oblique, of the tapered surface or its middle.
-
-    Its edges do not leak into short waves.
-    """
-    edge = LARGEST_CROP ** (3 - lattice.axes)
-    is_part = is_complete and max(heights.shape) > edge
-    if is_part:
-        heights = heights[middle_slices(heights.shape, edge)]
-    is_periodic = lattice.periodic and not is_part
-    torus = Lattice((heights.shape[0], heights.shape[1]), lattice.spacing, True)
-    if lattice.axes == 2 and not is_periodic:  # offsets of rows and columns are in none of the modes
-        heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
-    tapers = [window_weights(n, None if n == 1 or is_periodic else "hann") for n in heights.shape]
-    power = torus.power(heights * (tapers[0][:, None] * tapers[1]))
-    pilot = torus.q ** (-1.0 - torus.axes)
-    inside = power > _EMPTY * float(np.max(power / pilot)) * pilot
-    keep = inside & (torus.q > 4.0 * 2.0 * np.pi / torus.longest)
-    if np.count_nonzero(keep) < LEAST * LEAST_BINS:
-        keep = inside if np.count_nonzero(inside) >= LEAST * LEAST_BINS else np.ones(keep.shape, dtype=bool)
-    ratio = whitened(torus, power, pilot, keep)
-    levels = levels_by_azimuth(torus, ratio, keep)
-    turned = lattice.axes == 2 and is_oblique(torus, ratio, levels, 1.0 if is_periodic else TAPERED)
-    torus = replace(torus, stretch=stretch(torus, levels, pilot, information=TAPERED))
-    y, x = torus.wavenumbers
-    pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
-    bins = make_bins(torus, power, pilot, keep, is_tapered=not is_periodic, is_pilot=True)
-    hypothesis, _, theta = posterior(bins, spread=spread, is_pilot=True).most_probable
-    return theta, hypothesis.form, torus.stretch, turned
-
-
-def _without_plane(heights: Array) -> Array:
-    """Return heights less their plane, or those of a profile less their line."""
-    if heights.shape[0] == 1:
-        return detrended(heights[0], 1)[0][None]
-    return detrended(heights, 1)[0]
-
-
-def _without_rim(heights: Array) -> Array:
-    """Return heights without the outer rows and columns of which nothing was observed."""
-    observed = np.isfinite(heights)
-    rows, columns = np.flatnonzero(observed.any(axis=1)), np.flatnonzero(observed.any(axis=0))
-    return heights[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-
-
-def _estimate(
-    surface: Surface,
-    fit: ModeFit,
-    bins: Bins,
-    found: Posterior,
-    window: Scales,
-    unit: float,
-    noise: float | None,
-    psf: float | None,
-) -> Estimate:
+def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, known: Known) -> Estimate:
     """Return the record of a posterior, with what was found in words."""
     low, middle, high, deviation = found.interval()
     discrepancy = found.most_probable[1]
-    dx = surface.spacing[1]
+    dx, unit = surface.spacing[1], first.scale * surface.unit
     inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx
     amplitude = math.sqrt(max(_amplitude(bins, found), 0.0))
-    is_noisy = noise is None and found.probability("is_noisy") > _SEEN
-    is_blurred = psf is None and found.probability("is_blurred") > _SEEN
+    is_noisy = known.noise is None and found.probability("is_noisy") > _SEEN
+    is_blurred = known.spread is None and found.probability("is_blurred") > _SEEN
     spread = found.mean(SPREAD, "is_blurred") * dx if is_blurred else math.nan
     height = amplitude * unit * found.mean(NOISE, "is_noisy") if is_noisy else math.nan
     estimate = Estimate(
@@ -332,15 +222,15 @@ def _estimate(
         scale_min=float(inside.min()),
         scale_max=float(inside.max()),
         rms_increment=amplitude * unit,
-        noise_height=height if noise is None else noise,
-        blur_spread=spread if psf is None else psf,
+        noise_height=height if known.noise is None else known.noise * unit,
+        blur_spread=spread if known.spread is None else known.spread * dx,
         misfit=_misfit(bins, found),
-        window="asked for" if window is not None else "all wavelengths that one model describes",
+        window="asked for" if known.is_window else "all wavelengths that one model describes",
         note=joined(*_findings(found, bins, dx, spread, height)),
         posterior=found,
     )
-    reason = diagnose(surface, is_window=window is not None)
-    if any(surface.grid.periodic) and not fit.lattice.periodic:
+    reason = diagnose(surface, is_window=known.is_window)
+    if any(surface.grid.periodic) and not first.lattice.periodic:
         reason = _PERIODIC_GAPS
     if not reason and high - low > WIDEST:
         reason = f"the heights do not determine the exponent: {low:.2f} to {high:.2f} is as likely"

@@ -36,6 +36,7 @@ _NODES, _IMAGES = 8, 4  # of the interpolation, and images summed each way: dens
 # t times the ratio of the metric from which on a sum over lags is used: both are exact to 1e-5
 _NARROW = 1.85
 _REACH = 2.6  # longest of these lags over the ratio
+LARGEST_LOG_RATIO = math.log(16.0)  # of a metric that is fitted: lags in the tables grow with its square
 
 
 def metric_of(u: float, v: float) -> Array:
@@ -91,7 +92,6 @@ class MetricSpectrum:
             )
             rows = rows @ self._far_images
             total += np.sum(rows * columns, axis=1) if y.shape == x.shape else block_product(rows, columns.T)
-            np.maximum(total, 1e-300, out=total)
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):
                 total *= np.square(kernel_transfer(s, q.ravel()).reshape(q.shape))
@@ -101,7 +101,7 @@ class MetricSpectrum:
             sharpness = self.theta[SHARPNESS]
             corner = sharpness * np.log(self.theta[CORNER] ** 2 / np.maximum(y * y + x * x, 1e-30))
             total *= np.exp((self.theta[LONG_HURST] - hurst) / sharpness * np.logaddexp(0.0, corner))
-        return np.asarray(total)
+        return np.maximum(total, 1e-300)
 
     def with_noise(self, y: Array, x: Array) -> Array:
         """Return `at` with white noise."""
@@ -182,7 +182,7 @@ def gaussian_tables(
             wider = np.eye(2) + 4.0 * spread**2 * once
             forms = np.moveaxis(once @ np.linalg.inv(wider), 0, 2)[..., None]
             lags = np.exp(-squared_length(forms, ry, rx)) / np.sqrt(np.linalg.det(wider))[:, None]
-            aliased[:, narrow] = 1.0 / np.sqrt(np.linalg.det(wider)) + cosines @ lags.T
+            aliased[:, narrow] = 1.0 / np.sqrt(np.linalg.det(wider)) + block_product(cosines, lags.T)
         if not tables:
             sampled = aliased
         transfer = np.square(kernel_transfer(spread / dy, y * dy) * kernel_transfer(spread, x))

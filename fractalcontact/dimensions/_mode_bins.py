@@ -27,6 +27,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
+EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
 LEAST_BINS = 3  # an amplitude, an exponent, and one that can contradict them
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
 # Modes of a bin in a table of a first fit, and of the posterior. With the first number, and its steps of the
@@ -36,7 +37,7 @@ _SAMPLES = 64, 256
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
 _ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
 FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
-_SECTORS = 9  # of azimuth, on a quarter of the plane; an odd number, so that no sector ends at the diagonal
+_SECTORS = 9  # of azimuth in a quarter of the plane: an odd number, so that no sector ends at the diagonal
 _OCTAVE = math.log(2.0)
 
 
@@ -126,87 +127,51 @@ class Levels:
     ----------
     level, information : ndarray, shape (sectors,)
         Logarithm of the mean power over that expected, and the inverse of its variance; 0 without modes.
+    lnq : ndarray
+        Logarithms of the wavenumbers of the modes that were averaged, less their mean.
     rows, columns : ndarray of int
-        Of the modes that were averaged.
+        Of these modes.
     """
 
     level: Array
     information: Array
+    lnq: Array
     rows: Array
     columns: Array
 
+    def slope(self, power: Array) -> float:
+        """Return the slope of the logarithm of a power of all modes over that of the wavenumber."""
+        square = max(float(self.lnq @ self.lnq), 1e-300)
+        return float(self.lnq @ np.log(power[self.rows, self.columns])) / square
 
-def stretch(
-    lattice: Lattice,
-    levels: Levels,
-    unblurred: Array,
-    *,
-    information: float = 1.0,
-    largest: float = 8.0,
-    number: int = 121,
-) -> float:
-    """Return the stretch of the lattice, as the levels by azimuth show it.
+    @property
+    def azimuth(self) -> Array:
+        """Of the middle of each sector, radians from the x axis."""
+        return np.asarray((np.arange(0.5, self.level.size) / self.level.size - 0.5) * math.pi)
 
-    The power of waves of one length is (cos^2 + sin^2 / a^2)^(k / 2) of their azimuth, where `unblurred`, the
-    expected power without a blur, has the slope k. The stretch a, even in its logarithm, has the least chi
-    square. The logarithm is shrunk as in `lay`. `information`: of a mode. The `number` of stretches, up to
-    the `largest` both ways, makes steps of 3.5 %: in 128 x 128 points a stretch of 2 scatters by 5 %.
+
+def significant_share(square: float, freedom: int) -> float:
+    """Return the share of levels that chance does not explain, 0 where it explains their chi square.
+
+    The factor is that of James and Stein (1961), Proc. 4th Berkeley Symp. 1, but for the chi square of a
+    chance of `FALSE_ALARM` in place of its mean: the levels of few long waves reach all short ones.
     """
     from scipy.special import chdtri
 
-    level, weight = levels.level, levels.information
-    if np.count_nonzero(weight) < 3:  # a profile has one
-        return 1.0
-    y, x = lattice.wavenumbers
-    lnq = np.log(np.hypot(y[levels.rows], x[levels.columns]))
-    lnq -= lnq.mean()
-    slope = lnq @ np.log(unblurred[levels.rows, levels.columns]) / (lnq @ lnq)
-    azimuth = 0.5 * math.pi / _SECTORS * (np.arange(_SECTORS) + 0.5)
-    logarithms = np.r_[np.linspace(-math.log(largest), math.log(largest), number), math.log(lattice.stretch)]
-    squares = np.cos(azimuth) ** 2 + np.sin(azimuth) ** 2 * np.exp(-2.0 * logarithms[:, None])
-    residual = level - 0.5 * slope * np.log(squares[:-1] / squares[-1])
-    residual -= (residual @ weight / weight.sum())[:, None]
-    square = np.square(residual) @ weight * information
-    best = int(np.argmin(square))
-    gain = float(square[number // 2] - square[best])
-    by_chance = float(chdtri(1, FALSE_ALARM))
-    return math.exp(logarithms[best] * (1.0 - by_chance / gain)) if gain > by_chance else 1.0
-
-
-def is_oblique(lattice: Lattice, ratio: Array, levels: Levels, information: float) -> bool:
-    """Return whether Fourier modes show a lay that is oblique to the axes; `ratio` is power over expected.
-
-    The probabilities of the powers of a sector are compared between waves that run up and down, by the sine
-    of twice their azimuth: a test of one degree of freedom. `information`: of a mode.
-    """
-    from scipy.special import chdtri
-
-    y, x = lattice.wavenumbers
-    y, x, values = y[levels.rows], x[levels.columns], ratio[levels.rows, levels.columns]
-    sector = _sectors(y, x)
-    mean = np.bincount(sector, values) / np.maximum(np.bincount(sector), 1)
-    probability = -np.expm1(-values / np.maximum(mean[sector], 1e-300))  # even between 0 and 1
-    wave = 2.0 * y * x / (np.square(y) + np.square(x))
-    variance = float(wave @ wave) / 12.0
-    square = information * float(wave @ (probability - 0.5)) ** 2 / max(variance, 1e-300)
-    return square > float(chdtri(1, FALSE_ALARM))
+    return max(0.0, 1.0 - float(chdtri(freedom, FALSE_ALARM)) / max(square, 1e-300)) if freedom > 0 else 0.0
 
 
 def lay(lattice: Lattice, levels: Levels) -> Array | float:
     """Return the relative power of the azimuth of each mode, shrunk to one as far as chance explains it.
 
-    An anisotropic self-affine surface has a level of its own in each direction, and the same exponent. The
-    factor is that of James and Stein (1961), Proc. 4th Berkeley Symp. 1, but for the chi square of a chance
-    of `FALSE_ALARM` in place of its mean: the levels of few long waves reach all short ones.
+    An anisotropic self-affine surface has a level of its own in each direction, and the same exponent.
     """
-    from scipy.special import chdtri
-
     square = float(levels.information @ np.square(levels.level))
-    freedom = np.count_nonzero(levels.information) - 1
-    if not freedom > 0 or square <= (by_chance := float(chdtri(freedom, FALSE_ALARM))):
+    share = significant_share(square, int(np.count_nonzero(levels.information)) - 1)
+    if share == 0.0:
         return 1.0
     y, x = lattice.wavenumbers
-    return np.asarray(np.exp((1.0 - by_chance / square) * levels.level)[_sectors(y[:, None], x)])
+    return np.asarray(np.exp(share * levels.level)[_sectors(y[:, None], x)])
 
 
 def levels_by_azimuth(
@@ -224,14 +189,15 @@ def levels_by_azimuth(
     rows, columns = np.nonzero(keep[np.ix_(near_y, near_x)] & is_near)
     rows, columns = near_y[rows], near_x[columns]
     sector = _sectors(y[rows], x[columns])
-    count = np.bincount(sector, minlength=_SECTORS)
+    count = np.bincount(sector, minlength=2 * _SECTORS)
     known = count > 0
-    level, information = np.zeros(_SECTORS), np.zeros(_SECTORS)
-    mean = np.bincount(sector, ratio[rows, columns], minlength=_SECTORS)[known] / count[known]
+    level, information = np.zeros(count.size), np.zeros(count.size)
+    mean = np.bincount(sector, ratio[rows, columns], minlength=count.size)[known] / count[known]
     values, variance = log_means(np.maximum(mean, 1e-12), 0.5 * lattice.degrees * count[known])
     information[known] = 1.0 / variance
     level[known] = values - information[known] @ values / information.sum() if known.any() else 0.0
-    return Levels(level, information, rows, columns)
+    lnq = np.log(np.hypot(y[rows], x[columns]))
+    return Levels(level, information, lnq - lnq.sum() / max(lnq.size, 1), rows, columns)
 
 
 def log_means(mean: Array, degrees: Array) -> tuple[Array, Array]:
@@ -246,9 +212,9 @@ def log_means(mean: Array, degrees: Array) -> tuple[Array, Array]:
 
 
 def _sectors(y: Array, x: Array) -> Array:
-    """Return the sector of azimuth of wavenumbers."""
-    sector = (np.arctan2(np.abs(y), np.abs(x)) * (2.0 * _SECTORS / math.pi)).astype(np.int16)
-    return np.minimum(sector, _SECTORS - 1)
+    """Return the sector of azimuth of wavenumbers: those of cosine modes are in the upper half."""
+    sector = (np.arctan2(y, x) * (2.0 * _SECTORS / math.pi) + _SECTORS).astype(np.int16)
+    return np.clip(sector, 0, 2 * _SECTORS - 1)
 
 
 def make_bins(

@@ -32,7 +32,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -58,6 +58,43 @@ _LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any oth
 _SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
 _OCTAVE = math.log(2.0)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a surface before its spectrum is fitted; None where it is estimated.
+
+    Attributes
+    ----------
+    spread : float, optional
+        Of the blur of the instrument, x spacings.
+    noise : float, optional
+        Rms height of white noise over the rms increment; 0 for none.
+    background : float
+        The same of noise that is there in any case, as of rounding.
+    is_window : bool
+        The waves were chosen beforehand: without corners and cuts.
+    """
+
+    spread: float | None = None
+    noise: float | None = None
+    background: float = 0.0
+    is_window: bool = False
+
+    @classmethod
+    def of(cls, is_window: bool, spread: float | None = None, noise: float | None = None) -> Known:
+        """Return what is known; waves that were chosen beforehand have neither unless it is told."""
+        return cls(spread or 0.0, noise or 0.0, 0.0, True) if is_window else cls(spread, noise)
+
+    def over(self, increment: float, background: float) -> Known:
+        """Return the same, with the noise over an rms increment, and a background."""
+        noise = None if self.noise is None else self.noise / increment
+        return replace(self, noise=noise, background=background)
+
+    @property
+    def total_noise(self) -> float:
+        """Height of known noise with the background; 0 where there is none, or it is estimated."""
+        return math.hypot(self.noise, self.background) if self.noise else 0.0
 
 
 @dataclass(frozen=True)
@@ -230,16 +267,15 @@ def _shortest(u: Array, below: Array, probability: float = 0.95) -> Interval:
     return Interval(float(low), float(np.interp(0.5, below, hurst)), float(high), deviation)
 
 
-def hypotheses(spread: float | None, noise: bool | None, background: float) -> list[Hypothesis]:
-    """Return the combinations of nuisances; a known `spread` (spacings) is not fitted.
-
-    `noise`: whether there is white noise, if that is known. `background` is the noise that is known to be
-    there, as of rounding, over the rms increment.
-    """
+def hypotheses(known: Known) -> list[Hypothesis]:
+    """Return the combinations of nuisances; what is known is not fitted."""
+    spread, noise = known.spread, known.noise
     nan = math.nan
     found = []
     for form, is_blurred, is_noisy, is_bent in itertools.product(range(FORMS), *[(False, True)] * 3):
-        if (is_blurred and spread is not None) or (noise is not None and is_noisy != noise):
+        if (is_blurred and spread is not None) or (noise is not None and is_noisy != (noise > 0.0)):
+            continue
+        if is_bent and known.is_window:
             continue
         has_blur = is_blurred or bool(spread)
         if form == FILTERED and not has_blur:  # the same as ALIASED
@@ -253,7 +289,7 @@ def hypotheses(spread: float | None, noise: bool | None, background: float) -> l
         if has_blur and form != UNALIASED:
             log_prior -= math.log(2.0)  # a blur before sampling is as probable as one after it
         blur = nan if is_blurred else spread or 0.0
-        white = nan if is_noisy else background
+        white = nan if is_noisy else known.background
         bend = (nan, nan, nan) if is_bent else (0.0, 0.0, 1.0)
         found.append(Hypothesis(form, (nan, blur, white, *bend), log_prior))
     return found
@@ -261,13 +297,10 @@ def hypotheses(spread: float | None, noise: bool | None, background: float) -> l
 
 def posterior(
     bins: Bins,
+    known: Known = Known(),
     *,
-    spread: float | None = None,
-    noise: bool | None = None,
-    background: float = 0.0,
     pilot_spread: float = 0.0,
     is_pilot: bool = False,
-    is_window: bool = False,
     attempts: tuple[int, int] = (5, 2),
 ) -> Posterior:
     """Return the posterior of H.
@@ -275,26 +308,20 @@ def posterior(
     Parameters
     ----------
     bins : Bins
-    spread : float, optional
-        Of a known point spread function, spacings.
-    noise : bool, optional
-        Whether there is white noise. Its height, if that is known, is in the bins.
-    background : float
-        See `hypotheses`.
+        With the height of known noise.
+    known : Known
+        By default everything is estimated.
     pilot_spread : float
         A first estimate of the spread, for the scatter of the fourth order.
     is_pilot : bool
         For a first estimate of the spectrum: with fewer kinds of discrepancy.
-    is_window : bool
-        The waves were chosen beforehand: without corners and cuts.
     attempts : (int, int)
         Maxima that are looked for without a discrepancy, and of a pilot.
     """
-    chosen = hypotheses(spread, noise, background)
-    kinds = _discrepancies(bins, pilot_spread)
-    if is_window:
+    chosen = hypotheses(known)
+    kinds = _discrepancies(bins, pilot_spread if known.spread is None else 0.0)
+    if known.is_window:
         kinds = [kind for kind in kinds if kind.inside.all()]
-        chosen = [hypothesis for hypothesis in chosen if not hypothesis.is_bent]
     if is_pilot:
         kinds = [kind for kind in kinds if kind.inside[0] and kind.scatter[0] in (0.0, _TAUS[2])]
     corners = math.log(0.5 * np.pi / bins.extent), math.log(2.0 * np.pi / _SHORTEST_CORNER)

@@ -5,13 +5,14 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.dimensions import _spectral_posterior as sp
+from fractalcontact.dimensions._first_fit import first_fit
 from fractalcontact.dimensions._likelihood import fitted_modes
 from fractalcontact.dimensions._surface_input import read_surfaces
 
 
 def bins_of(hurst, n=96, seed=1):
     surface = fc.surfaces.fbm((n, n), 1e-4, hurst=hurst, rms_increment=1e-6, rng=seed)
-    return fitted_modes(read_surfaces(surface)[0]).bins()
+    return fitted_modes(first_fit(read_surfaces(surface)[0])).bins()
 
 
 def log_density(bins, theta, form=0):
@@ -24,7 +25,7 @@ def log_density(bins, theta, form=0):
 @pytest.mark.parametrize("hurst", [0.3, 0.7])
 def test_one_exponent_by_quadrature(hurst):
     bins = bins_of(hurst)
-    found = sp.posterior(bins, spread=0.0, noise=False)
+    found = sp.posterior(bins, sp.Known(0.0, 0.0))
     plain = next(m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0)
     grid = np.linspace(0.01, 0.99, 2000)
     logs = np.array([log_density(bins, np.array([h, 0.0, 0.0, 0.0, 0.0, 1.0])) for h in grid])
@@ -42,7 +43,7 @@ def test_one_exponent_by_quadrature(hurst):
 
 def test_evidence_of_noise_by_quadrature():
     bins = bins_of(0.6)
-    found = sp.posterior(bins, spread=0.0)
+    found = sp.posterior(bins, sp.Known(0.0))
     chosen = {h.is_noisy: m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0}
     ratio = found.share[chosen[True], 0] / found.share[chosen[False], 0]
     heights = np.linspace(0.01, 0.99, 200)

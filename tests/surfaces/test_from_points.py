@@ -252,7 +252,7 @@ def test_without_the_finest_scale_the_dimension_is_wrong():
 
 def test_directions_of_a_fine_grid_have_no_interval_of_its_own_waves():
     """Few waves of an isotropic cloud are resolved by its points; those of the gridding do not count."""
-    surface = fc.surfaces.from_points(measured_points("random", 0.5, 3), 2e-4, plane="xy")
+    surface = fc.surfaces.from_points(measured_points("random", 0.5, 5), 2e-4, plane="xy")
     resolved = fc.dimensions.directions(surface)
     every = fc.dimensions.directions(surface.drop_vars("finest_scale"))
     for result, words in ((resolved, "do not determine"), (every, "on lines between")):
