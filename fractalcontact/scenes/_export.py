@@ -96,21 +96,18 @@ def _sets_of_dims(dataset: xr.Dataset) -> list[tuple[str, ...]]:
 
 
 def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
+    """Return the variables of these dims beside their coordinates, a row for each point."""
+    from pandas import DataFrame  # type: ignore[import-untyped]
+
+    sizes = {dim: dataset.sizes[dim] for dim in dims}
+    coords = [name for name, coord in dataset.coords.items() if set(coord.dims) <= set(dims) - {name}]
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == dims]
-    chosen = dataset[names].drop_vars(
-        [name for name, coord in dataset.coords.items() if not set(coord.dims) <= set(dims)], errors="ignore"
-    )
-    # a load that can be selected would be no column
-    chosen = chosen.drop_indexes([name for name in chosen.xindexes if name not in chosen.dims])
-    if not dims:
-        chosen = chosen.expand_dims("row")
-    frame = (
-        chosen.to_dataframe(dim_order=list(dims) or None).reset_index().drop(columns="row", errors="ignore")
-    )
-    coords = [name for name in frame.columns if name not in names and name not in dims]
-    frame = frame[[*dims, *coords, *names]]
-    frame.columns = [heading(dataset, str(name)) for name in frame.columns]
-    return frame
+    variables: dict[Any, Any] = {dim: xr.Variable(dim, np.arange(size)) for dim, size in sizes.items()}
+    variables |= dataset.variables  # a dim may have no coordinate
+    return DataFrame({
+        heading(dataset, str(name)): variables[name].set_dims(sizes).values.ravel()
+        for name in (*dims, *coords, *names)
+    })  # fmt: skip
 
 
 def heading(dataset: xr.Dataset, name: str) -> str:
