@@ -73,14 +73,27 @@ class MapReader:
 
 
 @dataclass(frozen=True, repr=False)
+class ReaderOfSignature:
+    """A public function of all maps that takes their signature too, which it would compute again."""
+
+    function: MapReader
+    source: xr.Dataset
+
+    def __call__(self, signature: xr.Dataset) -> xr.Dataset:
+        """Return the result of the function for the maps."""
+        options = {**self.function.options, "signature": signature}
+        return replace(self.function, options=options)(self.source)
+
+
+@dataclass(frozen=True, repr=False)
 class PartWithReaders:
-    """A part and the stages that read its maps; maps that nothing else needs are dropped afterwards.
+    """A part and the stages that read its result; maps that nothing else needs are dropped afterwards.
 
     What fails has its error as result: the part of a reader that fails, and the other readers, are kept.
     """
 
     part: Part
-    readers: tuple[MapReader, ...] = ()
+    readers: tuple[Callable[[xr.Dataset], xr.Dataset], ...] = ()
     dropped: tuple[str, ...] = ()
 
     def __call__(self) -> tuple[list[xr.Dataset | Exception], list[float]]:
@@ -162,14 +175,10 @@ def stage_work(
     faces: Mapping[str, xr.DataArray],
 ) -> StageWork:
     """Return the parts of a stage, from the results and parts of the stages it needs, and the faces read."""
-    if stage.reads_part:
-        return works[stage.needs[0]]
+    if stage.follows:
+        return works[stage.follows]
     if stage.reads_map:
-        reader = map_reader(stage, scene)
-        if SIGNATURE in stage.needs:
-            options = {**reader.options, **_measured(scene, results, reader.options)}
-            reader = replace(reader, options=options)
-        return StageWork((partial(reader, results[stage.needs[0]]),))
+        return StageWork((partial(map_reader(stage, scene), results[stage.needs[0]]),))
     row = stage.row
     options = call_options(scene, row, stage.keep)
     if stage.name == "surfaces":
@@ -193,6 +202,12 @@ def stage_work(
 def map_reader(stage: Stage, scene: Scene) -> MapReader:
     """Return the function of a map that a stage stands for."""
     return MapReader(stage.row.function, stage.row.reads, call_options(scene, stage.row, stage.keep))
+
+
+def reader_of(stage: Stage, scene: Scene, results: Results) -> MapReader | ReaderOfSignature:
+    """Return the function of a part that a stage stands for, which follows another one."""
+    reader = map_reader(stage, scene)
+    return ReaderOfSignature(reader, results[stage.needs[0]]) if stage.follows == SIGNATURE else reader
 
 
 def _lower_face(scene: Scene, face: xr.DataArray | None) -> xr.Dataset:
@@ -244,13 +259,6 @@ def _pressed(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict
     own, other = ({key: of[key] for key in of if key not in free} for of in (options, of_closure))
     alike = own == other and "normal_force" in of_closure
     return {"pressed": without(results["joints/closure"], CONTACT_MAPS)} if alike else {}
-
-
-def _measured(scene: Scene, results: Results, options: Mapping[str, Any]) -> dict[str, xr.Dataset]:
-    """Return the signature as the argument of the evolution, where both have the same options."""
-    own = stage_options(scene, STAGES[SIGNATURE])
-    alike = all(own.get(key) == options.get(key) for key in STAGES[SIGNATURE].arguments())
-    return {"signature": results[SIGNATURE]} if alike else {}
 
 
 def _heights(results: Results, stage: str) -> xr.DataArray:

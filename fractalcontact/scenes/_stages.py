@@ -18,10 +18,12 @@ from fractalcontact.base.resources import Plane, bytes_on, map_bytes, require_me
 from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _domain_stages, _joint_stages, _surface_stages
+from fractalcontact.scenes._domain_stages import SIGNATURE
 from fractalcontact.scenes._inputs import (
     block_shape,
     call_options,
     generator_options,
+    stage_options,
     surface_grid,
     values_of,
 )
@@ -100,6 +102,13 @@ class Stage:
     def reads_part(self) -> bool:
         """Whether it reads that map plane by plane, so that the map does not have to be kept."""
         return self.reads_map and not self.whole_path
+
+    @property
+    def follows(self) -> str:
+        """The stage whose parts it reads, each as soon as it is there: that of the map, or the signature."""
+        if self.reads_map and SIGNATURE in self.needs:
+            return SIGNATURE
+        return self.needs[0] if self.reads_part else ""
 
 
 def section_length(steps: int, nodes: int, *, has_hardness: bool) -> int:
@@ -188,7 +197,7 @@ def stages_of(scene: Scene) -> tuple[Stage, ...]:
     stages = [
         Stage(
             name,
-            _needs(row, reasons),
+            _needs(row, reasons, scene),
             reasons[name],
             stored=name != "surfaces" or reasons[name] != "input",
             whole_path=row.whole_path or (row.takes == "map" and "total_stress" in values_of(scene, row)),
@@ -247,11 +256,17 @@ def _reasons(scene: Scene) -> dict[str, str]:
     return reasons
 
 
-def _needs(row: StageType, planned: dict[str, str]) -> tuple[str, ...]:
-    """Return the stages that a row needs, as far as the plan has them."""
+def _needs(row: StageType, planned: dict[str, str], scene: Scene) -> tuple[str, ...]:
+    """Return the stages that a row needs, as far as the plan has them; a signature only if it is the same."""
     alternatives = (need.split(" or ") for need in row.needs)
     first = (next((name for name in names if name in planned), None) for names in alternatives)
-    return tuple(name for name in first if name is not None)
+    return tuple(name for name in first if name and (name != SIGNATURE or _has_signature(row, scene)))
+
+
+def _has_signature(row: StageType, scene: Scene) -> bool:
+    """Whether the options of a stage are those of the signature of the study."""
+    options, own = (stage_options(scene, each) for each in (row, STAGES[SIGNATURE]))
+    return all(options.get(key) == own.get(key) for key in STAGES[SIGNATURE].arguments())
 
 
 # bytes of the libraries that a study has loaded at its start, and of the compiled kernels of a subpackage,

@@ -222,11 +222,11 @@ class Study:
                 parts[number] = kept
 
     def _tasks(self, stage: Stage) -> dict[tuple[str, int], _PartTask]:
-        """Return the missing parts of a stage, each with the stages that read its maps."""
+        """Return the missing parts of a stage, each with the stages that follow it."""
         work = self.works[stage.name]
-        # the stages that read the maps of this one part by part, before the maps are dropped
-        readers = [other for other in self.plan if stage.name in other.needs and other.reads_part]
-        functions = tuple(_parts.map_reader(reader, self.scene) for reader in readers)
+        # the stages that read this one part by part, before its maps are dropped
+        readers = [other for other in self.plan if other.follows == stage.name]
+        functions = tuple(_parts.reader_of(reader, self.scene, self.results) for reader in readers)
         names = (stage.name, *(reader.name for reader in readers))
         for name in names:
             self._load_kept(name, len(work.parts))

@@ -1,5 +1,6 @@
 """A scene run from end to end: only the wanted results, one valid file, resumed where it stopped."""
 
+import functools
 import pickle
 from concurrent.futures import Executor, Future
 
@@ -313,3 +314,42 @@ def test_a_file_is_read_once(tmp_path, monkeypatch):
     tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
     assert files == ["lower.nc", "upper.nc"]
     np.testing.assert_array_equal(tree["surfaces/height"], lower)
+
+
+@pytest.mark.parametrize(("table", "taken"), [("", True), ("[domains.evolution]\nconnectivity = 2\n", False)])
+def test_evolution_takes_the_signature_if_the_options_are_alike(table, taken, tmp_path, monkeypatch):
+    text = f"""[surface]
+generate = "fbm"
+shape = [48, 48]
+spacing = 1e-4
+hurst = 0.8
+rms_increment = 2e-6
+rng = 1
+[material]
+young = 3e10
+poisson = 0.2
+[joint]
+block = 3.2e-3
+shear = [1e-4, 2e-4]
+normal_force = [10.0, 100.0]
+{table}[want]
+joints = ["closure"]
+domains = ["signature", "evolution"]
+keep = ["state"]
+"""
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    signatures = []
+
+    @functools.wraps(fc.domains.evolution)
+    def recorded(mask, *, signature=None, **options):
+        signatures.append(signature)
+        return recorded.__wrapped__(mask, signature=signature, **options)
+
+    monkeypatch.setattr(fc.domains, "evolution", recorded)
+    tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    monkeypatch.undo()
+    assert [each is not None for each in signatures] == [taken]
+    state, options = tree["joints/closure/state"], {} if taken else {"connectivity": 2}
+    alone, stored = fc.domains.evolution(state, **options), tree["domains/evolution"].to_dataset()
+    for name in alone.data_vars.keys() - {"run_time"}:
+        np.testing.assert_array_equal(stored[name], alone[name])
