@@ -24,13 +24,11 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.spectra import half_wavenumbers
-from fractalcontact.dimensions._first_fit import FirstFit
 from fractalcontact.dimensions._gaussian_mixture import Bins, mixture, spread_nodes
 from fractalcontact.dimensions._metric_spectrum import (
     LARGEST_LOG_RATIO,
     MetricSpectrum,
     gaussian_tables,
-    metric_of,
 )
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
@@ -41,14 +39,8 @@ from fractalcontact.dimensions._mode_bins import (
     joined_classes,
     log_means,
 )
-from fractalcontact.dimensions._spectral_posterior import (
-    HURST,
-    NOISE,
-    SPREAD,
-    Known,
-    Posterior,
-    posterior,
-)
+from fractalcontact.dimensions._mode_fit import FirstFit, fitted_modes
+from fractalcontact.dimensions._spectral_posterior import HURST, NOISE, SPREAD, Known, Posterior, posterior
 from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -250,40 +242,38 @@ class Classes:
         """Return columns less the mean of their ring, shape (classes, columns)."""
         return np.stack([c - self.by_ring(c, self.count)[self.ring] for c in columns], axis=1)
 
-    def metric_columns(
-        self, spectrum: MetricSpectrum, uv: Array, relative: Array, step: float = 1e-4
-    ) -> list[Array]:
+    def metric_columns(self, spectrum: MetricSpectrum, relative: Array, step: float = 1e-4) -> list[Array]:
         """Return the derivatives of the logarithms with respect to the components of the log ratio.
 
         `relative`: power of the spectrum.
         """
-        moved = [replace(spectrum, metric=metric_of(*(uv + move))) for move in np.eye(2) * step]
+        moved = [replace(spectrum, log_ratio=spectrum.log_ratio + move) for move in np.eye(2) * step]
         powers = relative, *(self.relative(each) for each in moved)
         here, *there = (np.log(np.maximum(power, 1e-300)) for power in powers)
         return [(each - here) / step for each in there]
 
-    def fit_metric(self, spectrum: MetricSpectrum, uv: Array) -> tuple[Array, Array, float]:
-        """Return the components of the log ratio, by Fisher scoring, their covariance, and -2 log evidence.
+    def fit_metric(self, spectrum: MetricSpectrum) -> tuple[MetricSpectrum, Array, float]:
+        """Return the spectrum with the log ratio by Fisher scoring, its covariance, and -2 log evidence.
 
         The evidence is that of the classes about the mean of their ring, over the prior of the log ratio.
         """
         weight = self.count * self.information
         for _ in range(_ROUNDS):
-            spectrum = replace(spectrum, metric=metric_of(*uv))
             relative = self.relative(spectrum)
-            columns = self.centred(self.metric_columns(spectrum, uv, relative))
+            columns = self.centred(self.metric_columns(spectrum, relative))
             information = (weight[:, None] * columns).T @ columns
             covariance = np.linalg.pinv(information)
             step = covariance @ (columns.T @ (weight * self.excess(relative)))
-            uv = uv + step / max(1.0, math.hypot(*step))
-            uv = uv / max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)
+            uv = spectrum.log_ratio + step / max(1.0, math.hypot(*step))
+            uv /= max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)
+            spectrum = replace(spectrum, log_ratio=uv)
             if math.hypot(*step) < 0.01:
                 break
-        excess = self.excess(self.relative(replace(spectrum, metric=metric_of(*uv))))
+        excess = self.excess(self.relative(spectrum))
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
         over = np.eye(2) + _PRIOR_LOG_RATIO**2 * information
         deviance += uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
-        return uv, covariance, float(deviance)
+        return spectrum, covariance, float(deviance)
 
     @property
     def _logs(self) -> tuple[Array, Array]:
@@ -291,23 +281,18 @@ class Classes:
         floor = _EMPTY * float(self.level.max())
         return log_means(np.maximum(self.level, floor), np.maximum(self.count * self.information, 1e-3))
 
-    def levels(self) -> tuple[Array, Array, Array]:
-        """Return the mean logarithms of the rings, their variances, and the shares of the classes.
+    def bins(self, spectrum: MetricSpectrum) -> Bins:
+        """Return the bins of the posterior: the rings, with the mean logarithms of their classes.
 
         Where the exponent differs with the azimuth the mean of the logarithms has the mean exponent.
         """
-        logs, variance = self._logs
-        share = 1.0 / variance
-        total = np.bincount(self.ring, share)
-        return self.by_ring(logs, share), 1.0 / total, share / total[self.ring]
-
-    def bins(self, spectrum: MetricSpectrum) -> Bins:
-        """Return the bins of the posterior: the rings."""
         modes = self.modes
         edges = modes.shape[0] * modes.dy, float(modes.shape[1])
         t, extent = mixture(max(edges)), max(edges)
         spreads, nodes = spread_nodes(min(edges), is_pilot=False)
-        level, variance, share = self.levels()
+        logs, variance = self._logs
+        total = np.bincount(self.ring, 1.0 / variance)
+        share = 1.0 / (variance * total[self.ring])
         weight = np.repeat(share / self.size, self.size) / self._before
         starts = self.first[np.flatnonzero(np.diff(self.ring, prepend=-1))]
 
@@ -316,7 +301,8 @@ class Classes:
 
         tables = gaussian_tables(t, spreads, spectrum.metric, self.sample, modes.dy, mean)
         lnq = self.by_ring(self.lnq, self.count)
-        return Bins(level, variance, tables, nodes, t, mean(np.ones(weight.size)), lnq, extent, 2)
+        level = self.by_ring(logs, share)
+        return Bins(level, 1.0 / total, tables, nodes, t, mean(np.ones(weight.size)), lnq, extent, 2)
 
     def along(self, spectrum: MetricSpectrum, azimuths: Array) -> Array:
         """Fit amplitude and exponent to all waves, and to those about azimuths (degree).
@@ -354,15 +340,13 @@ class Classes:
             found.append((a, hurst, scatter[1, 1] * max(1.0, square)))
         return np.array(found)
 
-    def test(self, spectrum: MetricSpectrum, uv: Array | None, shortest: float = 3.0) -> float:
+    def test(self, spectrum: MetricSpectrum, *, is_fitted: bool, shortest: float = 3.0) -> float:
         """Return the p value of harmonics of the azimuth of waves longer than the `shortest`, in spacings.
 
-        The components `uv` of the log ratio were fitted; None: about an isotropic surface.
+        `is_fitted`: the log ratio of the spectrum was fitted.
         """
         from scipy.special import chdtrc
 
-        fitted = 0 if uv is None else 2
-        spectrum = replace(spectrum, metric=metric_of(*(np.zeros(2) if uv is None else uv)))
         lower = np.linalg.cholesky(np.linalg.inv(spectrum.metric))
         azimuth = np.pi / SECTORS * self.sector
         across = lower[0, 0] * np.sin(azimuth) + lower[1, 0] * np.cos(azimuth)
@@ -370,17 +354,17 @@ class Classes:
         waves = [wave(order * azimuth) for order in (2, 4) for wave in (np.cos, np.sin)]
         columns = [*waves, *(self.lnq * wave for wave in waves)]
         relative = self.relative(spectrum)
-        if uv is not None:
-            columns[:2] = self.metric_columns(spectrum, uv, relative)
+        if is_fitted:
+            columns[:2] = self.metric_columns(spectrum, relative)
         length = 2.0 * np.pi / np.exp(self.by_ring(self.lnq, self.count)) / max(1.0, self.modes.dy)
         weight = self.count * self.information * (length > shortest)[self.ring]
         centred = self.centred(columns)
         score = centred.T @ (weight * self.excess(relative))
         covariance = (weight[:, None] * centred).T @ centred
-        if fitted:
-            projection = covariance[fitted:, :fitted] @ np.linalg.pinv(covariance[:fitted, :fitted])
-            score = score[fitted:] - projection @ score[:fitted]
-            covariance = covariance[fitted:, fitted:] - projection @ covariance[:fitted, fitted:]
+        if is_fitted:
+            projection = covariance[2:, :2] @ np.linalg.pinv(covariance[:2, :2])
+            score = score[2:] - projection @ score[:2]
+            covariance = covariance[2:, 2:] - projection @ covariance[:2, 2:]
         return float(chdtrc(score.size, score @ np.linalg.pinv(covariance) @ score))
 
 
@@ -440,53 +424,49 @@ def fit_azimuths(
         return classes
 
     def most_probable(
-        classes: Classes, spectrum: MetricSpectrum, uv: Array
-    ) -> tuple[Bins, Posterior, MetricSpectrum, Array, Array]:
-        """Return bins and posterior, and the spectrum with its log ratio and covariance.
+        classes: Classes, spectrum: MetricSpectrum
+    ) -> tuple[Bins, Posterior, MetricSpectrum, Array]:
+        """Return bins, posterior, spectrum, and the covariance of its log ratio.
 
         The probability of a hypothesis is multiplied by that of the azimuths, with a metric of its own.
         """
-        spectrum = replace(spectrum, metric=metric_of(*uv))
         bins = replace(classes.bins(spectrum), noise=known.total_noise)
         found = posterior(bins, known, pilot_spread=float(spectrum.theta[SPREAD]))
         fits, share = [], np.zeros_like(found.share)
         for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE):
             theta = found.theta[m, int(np.argmax(found.share[m]))]
             each = replace(spectrum, theta=theta, form=found.hypotheses[m].form)
-            fits.append((each, *classes.fit_metric(each, uv), m))
-        least = min(fit[3] for fit in fits)
+            fits.append((*classes.fit_metric(each), m))
+        least = min(fit[2] for fit in fits)
         for *_, deviance, m in fits:
             share[m] = found.share[m] * math.exp(0.5 * (least - deviance))
         found = replace(found, share=share / share.sum())
-        spectrum, uv, covariance, *_ = max(fits, key=lambda fit: float(found.share[fit[4]].sum()))
-        return bins, found, replace(spectrum, metric=metric_of(*uv)), uv, covariance
+        return bins, found, *max(fits, key=lambda fit: float(found.share[fit[3]].sum()))[:2]
 
-    uv = first.log_ratio
-    spectrum = MetricSpectrum(first.theta, first.form, metric_of(*uv), dy)
+    start = None if first.is_complete else fitted_modes(first)
+    theta, form = (first.theta, first.form) if start is None else (start.theta, start.form)
+    spectrum = MetricSpectrum(theta, form, first.log_ratio, dy)
     for _ in range(_ROUNDS):
         some = classes_of(spectrum)
         if some is None:
             return None
-        classes, before = some, uv
-        uv, covariance, _ = classes.fit_metric(spectrum, uv)
-        if math.hypot(*uv) < least_log_ratio:
+        classes = some
+        spectrum = classes.fit_metric(spectrum)[0]
+        if math.hypot(*spectrum.log_ratio) < least_log_ratio:
             return None
-        bins, found, spectrum, uv, covariance = most_probable(classes, spectrum, uv)
+        bins, found, spectrum, covariance = most_probable(classes, spectrum)
+        moved = math.hypot(*(spectrum.log_ratio - classes.spectrum.log_ratio))
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
-        if math.hypot(*(uv - before)) < _SAME and np.ptp(change) < 0.7:
+        if moved < _SAME and np.ptp(change) < 0.7:
             break
-    p_values = classes.test(spectrum, None), classes.test(spectrum, uv)
+    isotropic, uv = replace(spectrum, log_ratio=np.zeros(2)), spectrum.log_ratio
+    p_values = classes.test(isotropic, is_fitted=False), classes.test(spectrum, is_fitted=True)
     if not first.is_complete and not found.most_probable[1].inside.all():
         # beyond a cut the waves are those of the filling, which know the axes
         p_values = math.nan, math.nan
     if p_values[1] < IMPROBABLE:  # each azimuth is compared with all of them
-        isotropic = metric_of(0.0, 0.0)
-        spectrum = replace(spectrum, metric=isotropic)
-        again = classes_of(spectrum)
-        if again is not None:
-            classes = again
-            bins, found, spectrum, *_ = most_probable(classes, spectrum, np.zeros(2))
-            spectrum = replace(spectrum, metric=isotropic)
+        bins, found, spectrum, _ = most_probable(classes, isotropic)
+        spectrum = replace(spectrum, log_ratio=np.zeros(2))
     return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values)
 
 

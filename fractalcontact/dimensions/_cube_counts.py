@@ -19,9 +19,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    check_surface(
-        problems, squares=True, reserved=("cube_count", "cube_size", "pair_count", "vertical_scale", *ALWAYS)
-    )
+    check_surface(problems, reserved=("cube_count", "cube_size", "pair_count", "vertical_scale", *ALWAYS))
     if not (isinstance(given.vertical_scale, str) and given.vertical_scale == "range"):
         problems.number("vertical_scale", above=0, at_least=1e-50, at_most=1e50)
 
@@ -120,7 +118,7 @@ _STEEP = 2.0**300  # slope beyond which the area is proportional to the heights
 
 def _check_covering(problems: Problems) -> None:
     reserved = (*_NAMES.values(), "cube_size", "pair_count", "vertical_scale", *ALWAYS)
-    check_surface(problems, squares=True, reserved=reserved)
+    check_surface(problems, reserved=reserved)
     problems.number("vertical_scale", above=0, at_least=1e-50, at_most=1e50)
 
 

@@ -101,7 +101,7 @@ def surface_check(*names: str, smallest: int = 3) -> Callable[..., None]:
 
     def check(problems: Problems) -> None:
         reserved = (*names, "pair_count", *ALWAYS)
-        check_surface(problems, smallest=smallest, squares=True, reserved=reserved)
+        check_surface(problems, smallest=smallest, reserved=reserved)
 
     return check
 
@@ -173,9 +173,7 @@ def fit(method: Method, surface: Surface, scales: Scales, noise: float | None) -
     if method.ignores_plane and surface.is_plane:
         return plane()
     window, rule = _window(method, surface, scales)
-    # slopes do not depend on the unit of height, except for methods with a natural scale
-    overflows = not method.natural_scale and surface.squares_overflow
-    curve: Curve = function(method.curve)(surface.in_own_unit() if overflows else surface, window)
+    curve: Curve = function(method.curve)(surface, window)
     inside = between(curve.length, window) & (curve.value > 0)
     if np.count_nonzero(inside) < 2:
         return undefined(f"fewer than two points of the curve between {window[0]:g} m and {window[1]:g} m")
@@ -214,7 +212,8 @@ def fit(method: Method, surface: Surface, scales: Scales, noise: float | None) -
     y = y + 0.5 * np.diag(covariance)
     hurst = exponent(y)
     middle = float(np.clip(hurst, LOWEST, HIGHEST))
-    error = float(np.sqrt(line @ covariance @ line)) / abs(_sensitivity(line, expected, middle))
+    change = float(line @ (expected(middle + STEP) - expected(middle - STEP))) / (2.0 * STEP)
+    error = float(np.sqrt(line @ covariance @ line)) / abs(change)
     low, high = normal_interval(hurst, error)
     estimate = replace(estimate, hurst=hurst, standard_error=error, ci_low=low, ci_high=high, reason="")
     estimate = replace(estimate, misfit=_misfit(x, y - expected(middle), covariance))
@@ -265,11 +264,6 @@ def _crossing(slope: Callable[[float], float]) -> float:
         return 0.5 * (start + end)
     end, value = (LOWEST, low) if abs(low) < abs(high) else (HIGHEST, high)
     return end - value * 2.0 * STEP / (slope(end + STEP) - slope(end - STEP))
-
-
-def _sensitivity(line: Array, expected: Expected, hurst: float) -> float:
-    """Return the change of the slope with H."""
-    return float(line @ (expected(hurst + STEP) - expected(hurst - STEP))) / (2.0 * STEP)
 
 
 def _misfit(x: Array, y: Array, covariance: Array) -> float:

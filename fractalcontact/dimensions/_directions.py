@@ -13,26 +13,12 @@ from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._azimuths import (
-    IMPROBABLE,
-    LARGEST,
-    NO_METRIC,
-    AzimuthFit,
-    fit_azimuths,
-)
+from fractalcontact.dimensions._azimuths import IMPROBABLE, LARGEST, NO_METRIC, AzimuthFit, fit_azimuths
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
-from fractalcontact.dimensions._first_fit import first_fit
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, squared_length
-from fractalcontact.dimensions._records import (
-    CONSTANT,
-    NORMAL,
-    Estimate,
-    joined,
-    plane,
-    smooth,
-    undefined,
-)
+from fractalcontact.dimensions._mode_fit import first_fit
+from fractalcontact.dimensions._records import CONSTANT, NORMAL, Estimate, joined, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, Known
 from fractalcontact.dimensions._surface_input import (
     Scales,
@@ -255,9 +241,8 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
     dx, known = surface.spacing[1], Known.of(scales is not None)
     lengths = None if scales is None else (scales[0] / dx, scales[1] / dx)
     first = first_fit(surface, known.spread)
-    fit = None
-    if first is not None:
-        fit = fit_azimuths(first, lengths, known.over(1.0, rounding_noise(surface) / first.scale))
+    background = 0.0 if first is None else rounding_noise(surface) / first.scale
+    fit = None if first is None else fit_azimuths(first, lengths, known.over(1.0, background))
     if first is None or fit is None:
         record = (smooth() if scales is None else undefined(NO_MODES)).limited()
         return _Directional([record] * azimuths.size, None, record.note)

@@ -69,11 +69,7 @@ def _check(problems: Problems) -> None:
         problems.require(bool(names), "methods", "at least one name")
     problems.number("noise", at_least=0.0, optional=True)
     is_number = given.psf is not None and problems.number("psf", at_least=0.0)
-    is_valid = check_surface(
-        problems,
-        gaps=all(METHODS[name].gaps for name in names),
-        reserved=_NAMES,
-    )
+    is_valid = check_surface(problems, gaps=all(METHODS[name].gaps for name in names), reserved=_NAMES)
     if is_valid and is_number:
         extent = max(read_grid(given.surface, core_dims(given.surface)).extent)
         problems.number("psf", at_most=extent)

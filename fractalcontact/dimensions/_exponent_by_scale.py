@@ -13,9 +13,9 @@ import xarray as xr
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._first_fit import first_fit
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
-from fractalcontact.dimensions._likelihood import fitted_modes, likelihood
+from fractalcontact.dimensions._likelihood import likelihood
+from fractalcontact.dimensions._mode_fit import first_fit, fitted_modes
 from fractalcontact.dimensions._records import NORMAL
 from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD
 from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
@@ -43,7 +43,7 @@ _NAMES = (
 
 def _check(problems: Problems) -> None:
     surface = problems.given.surface
-    is_valid = check_surface(problems, smallest=16, squares=True, reserved=_NAMES)
+    is_valid = check_surface(problems, smallest=16, reserved=_NAMES)
     if is_valid and not is_lazy(surface):
         most = float(surface.isnull().mean([dim for dim in ("y", "x") if dim in surface.dims]).max())
         problems.require(most <= _MOST_MISSING, "surface", "at least half of the heights", f"{1 - most:.0%}")

@@ -29,9 +29,8 @@ from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._diagnosis import resampling, rounding_noise
-from fractalcontact.dimensions._first_fit import FirstFit, first_fit
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
-from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, ModeFit, fitted_modes
+from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
@@ -43,6 +42,7 @@ from fractalcontact.dimensions._mode_bins import (
     log_means,
     make_bins,
 )
+from fractalcontact.dimensions._mode_fit import FirstFit, ModeFit, first_fit, fitted_modes
 from fractalcontact.dimensions._records import CONSTANT, Estimate, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     HIGHEST,
@@ -340,13 +340,7 @@ class _Model:
         return self.means(fill(heights), columns) / ratio, np.maximum(information, 1e-3)
 
     def components(
-        self,
-        level: Array,
-        variance: Array,
-        new_share: float,
-        *,
-        probability: float = 0.99,
-        most: int = 64,
+        self, level: Array, variance: Array, new_share: float, *, probability: float = 0.99, most: int = 64
     ) -> tuple[Array, Array, Array]:
         """Return shares, and means and deviations of u of each window, for probable nuisances.
 

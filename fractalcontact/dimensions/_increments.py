@@ -33,7 +33,7 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._surface_input import LARGEST_UNIT, SMALLEST_UNIT, Scales, Surface
+from fractalcontact.dimensions._surface_input import Scales, Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -54,7 +54,7 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
             return undefined(
                 f"two lags m and 2 m spacings are needed between {scales[0]:g} m and {scales[1]:g} m"
             )
-    moments, unit = _moments(surface, stride)
+    moments = increment_moments(surface.slabs(REACH * stride), surface.grid.shape, stride)
     first, second = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(first) > 0:
         return undefined(CONSTANT)
@@ -64,7 +64,7 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
         "scale_max": stride * LAGS[lags - 1] * coarse,
         "window": rule,
     }
-    rounding = 0.0 if surface.is_lazy else 4.0 * np.spacing(abs(float(surface.raw[0, 0]))) / unit
+    rounding = 0.0 if surface.is_lazy else 4.0 * np.spacing(abs(float(surface.raw[0, 0])))
     if not np.nansum(second) > max(1e-22 * np.nansum(first), rounding**2):
         return replace(plane(), **window)
     pilot = _line(replace(moments, observed=None), surface.relative_spacing, 2, 0.5, lags)
@@ -76,7 +76,7 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
     # second differences over one lag have 4 - 4^H times the mean square of first differences
     square = first[0] if order == 1 else second[0] / (4.0 - 4.0 ** min(estimate.hurst, 0.999))
     rms = float(np.sqrt(square) * float(stride) ** -estimate.hurst)
-    estimate = replace(estimate, rms_increment=rms * unit)
+    estimate = replace(estimate, rms_increment=rms)
     if any(surface.grid.periodic):
         return estimate.without_interval(
             "a periodic surface is not fractional Brownian, and its shortest increments do not scale with H"
@@ -92,17 +92,6 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
             "points tell less of H than those of a Gaussian surface"
         )
     return estimate
-
-
-def _moments(surface: Surface, stride: int) -> tuple[Moments, float]:
-    """Return the mean squares and their unit of height: 1 m unless they over- or underflow."""
-    overlap = REACH * stride
-    with np.errstate(over="ignore", invalid="ignore"):  # they are measured again below
-        moments = increment_moments(surface.slabs(overlap), surface.grid.shape, stride)
-    largest = float(np.nanmax(moments.means, initial=0.0))
-    if surface.is_lazy or SMALLEST_UNIT**2 < largest < LARGEST_UNIT**2:
-        return moments, 1.0
-    return increment_moments(surface.slabs(overlap, surface.unit), surface.grid.shape, stride), surface.unit
 
 
 def _line(moments: Moments, spacing: tuple[float, ...], order: int, pilot: float, lags: int) -> Estimate:

@@ -2,7 +2,8 @@
 
 1. A first fit to the modes of the tapered surface gives a pilot: the expected power of each cosine mode.
 2. Modes that the edges, a filter or single waves dominate are left out; the lay is divided out; gaps are
-   filled, and their effect on the power is corrected.
+   filled, and their effect on the power is corrected (`_mode_fit`). Under an oblique lay the Fourier modes of
+   `_azimuths`, which have a metric, take the place of the cosine modes.
 3. The bins of the modes that are left have one posterior (`_spectral_posterior`): its median is the
    estimate, its standard deviation the standard error, the shortest interval with a probability of 95 % the
    interval.
@@ -13,36 +14,21 @@ Whole periodic surfaces have Fourier modes; profiles are the case of one axis.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.dimensions._azimuths import NO_METRIC, fit_azimuths
-from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise, unevenness
-from fractalcontact.dimensions._first_fit import NEAR_ISOTROPY, FirstFit, first_fit, log_ratio
-from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
-from fractalcontact.dimensions._mode_bins import (
-    EMPTY,
-    FALSE_ALARM,
-    LEAST,
-    LEAST_BINS,
-    clear_modes,
-    expected_power,
-    filling_ratio,
-    lay,
-    levels_by_azimuth,
-    make_bins,
-    single_waves,
-    whitened,
-)
+from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
+from fractalcontact.dimensions._gaussian_mixture import Bins
+from fractalcontact.dimensions._mode_bins import FALSE_ALARM, LEAST, LEAST_BINS
+from fractalcontact.dimensions._mode_fit import NEAR_ISOTROPY, FirstFit, first_fit, fitted_modes
 from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     CORNER,
-    HURST,
     LONG_HURST,
-    LOWEST,
     NOISE,
     SPREAD,
     Known,
@@ -63,38 +49,6 @@ NO_MODES = (
 )
 WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
 _SEEN = 0.8  # probability from which on a nuisance is named
-
-
-@dataclass(frozen=True)
-class ModeFit:
-    """Modes of a surface and their first fit.
-
-    Attributes
-    ----------
-    lattice : Lattice
-    power : ndarray
-        Squared modes, in squared rms increments, corrected for gaps and for the lay.
-    pilot : ndarray
-        Expected power of the first fit.
-    keep : ndarray of bool
-        Modes that count.
-    information : float or ndarray
-    theta : ndarray
-    form : int
-    """
-
-    lattice: Lattice
-    power: Array
-    pilot: Array
-    keep: Array
-    information: Array | float
-    theta: Array
-    form: int
-
-    def bins(self, keep: Array | None = None) -> Bins:
-        """Return the bins of the modes that count, or of some of them."""
-        chosen = self.keep if keep is None else keep
-        return make_bins(self.lattice, self.power, self.pilot, chosen, information=self.information)
 
 
 def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float | None = None) -> Estimate:
@@ -143,64 +97,17 @@ def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -
     if fit is None:
         return undefined(NO_MODES)
     keep = fit.keep & between(2.0 * np.pi / fit.lattice.q, window)
-    number = int(np.count_nonzero(keep))
-    if number < LEAST * LEAST_BINS and window is None and keep.size > 4 * LEAST * LEAST_BINS:
-        return smooth()
-    if number < LEAST * LEAST_BINS:
-        what = (
-            "in the window of scales"
-            if window is not None
-            else "that the edges of the surface do not dominate"
+    number, least = int(np.count_nonzero(keep)), LEAST * LEAST_BINS
+    if number < least:
+        if window is None and keep.size > 4 * least:
+            return smooth()
+        which = (
+            "that the edges of the surface do not dominate" if window is None else "in the window of scales"
         )
-        return undefined(f"{number} modes {what}, at least {LEAST * LEAST_BINS} are needed")
+        return undefined(f"{number} modes {which}, at least {least} are needed")
     bins = replace(fit.bins(keep), noise=known.total_noise)
     found = posterior(bins, known, pilot_spread=float(fit.theta[SPREAD]))
     return _estimate(surface, first, bins, found, known)
-
-
-def fitted_modes(first: FirstFit, corrections: int = 1) -> ModeFit | None:
-    """Return the modes of a surface; None if it has too few.
-
-    `corrections` for a stretch and gaps: a second one moved no rms error by more than .0005.
-    """
-    lattice, theta, form = first.lattice, first.theta, first.form
-    if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
-        return None
-    observed, is_complete = np.isfinite(first.heights), first.is_complete
-    modes = lattice.power(first.filled)
-    correction: Array | float = 1.0
-    information: Array | float = 1.0
-    for rounds in range(corrections, -1, -1):
-        pilot, clean = (expected_power(lattice, theta, form, edges=edges) for edges in (True, False))
-        sharp = theta.copy()
-        sharp[SPREAD] = 0.0
-        unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
-        keep = clear_modes(pilot, clean, unblurred)
-        if not is_complete:
-            correction = filling_ratio(lattice, pilot, observed)
-            information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
-        power = modes if is_complete else modes / correction
-        keep &= power > EMPTY * pilot
-        if not keep.any():
-            return None
-        ratio = whitened(lattice, power, pilot, keep)
-        keep &= ~single_waves(lattice, ratio, keep)
-        levels = levels_by_azimuth(lattice, ratio, keep)
-        level = lay(lattice, levels)
-        if not rounds:
-            break
-        uv, _, share = log_ratio(levels, np.array([math.log(lattice.stretch), 0.0]), levels.slope(unblurred))
-        stretch = math.exp(share * uv[0])
-        if is_complete and lattice.stretch == stretch == 1.0:
-            break
-        if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
-            bins = make_bins(lattice, power / level, pilot, keep, information=information, is_pilot=True)
-            hypothesis, _, theta = posterior(bins, Known(first.spread), is_pilot=True).most_probable
-            form = hypothesis.form
-        lattice = replace(lattice, stretch=stretch)
-    information = information / unevenness(first.heights)
-    power /= level
-    return ModeFit(lattice, power, pilot, keep, information, theta, form)
 
 
 def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, known: Known) -> Estimate:

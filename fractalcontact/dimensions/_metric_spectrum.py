@@ -21,14 +21,7 @@ import numpy as np
 
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, FILTERED, UNALIASED, kernel_transfer
 from fractalcontact.dimensions._mode_bins import block_product
-from fractalcontact.dimensions._spectral_posterior import (
-    CORNER,
-    HURST,
-    LONG_HURST,
-    NOISE,
-    SHARPNESS,
-    SPREAD,
-)
+from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, LONG_HURST, NOISE, SHARPNESS, SPREAD
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -61,16 +54,21 @@ class MetricSpectrum:
         Parameters of the model, `_spectral_posterior`.
     form : int
         Of the sampling and the blur.
-    metric : ndarray, shape (2, 2)
-        y first.
+    log_ratio : ndarray, shape (2,)
+        Components (u, v) of the metric, see `metric_of`.
     dy : float
         Spacing along y; that along x is one.
     """
 
     theta: Array
     form: int
-    metric: Array
+    log_ratio: Array
     dy: float
+
+    @cached_property
+    def metric(self) -> Array:
+        """By which increments count lengths, shape (2, 2), y first."""
+        return metric_of(*self.log_ratio)
 
     def at(self, y: Array, x: Array) -> Array:
         """Return the density at wavenumbers, of one shape or as a column and a row."""

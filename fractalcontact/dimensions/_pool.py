@@ -35,11 +35,11 @@ NEEDED = ("hurst", "standard_error", "fractal_dimension", "scale_min", "scale_ma
 def _check(problems: Problems) -> None:
     given = problems.given
     is_common = problems.choice("model", among=MODELS) and given.model == "common"
-    expected, is_one = (SURFACES, _is_surface) if is_common else (ESTIMATES, _is_result)
+    expected = SURFACES if is_common else ESTIMATES
     several = _listed(given.scans)
     problems.require(bool(several), "scans", expected, NONE)
     for each in several:
-        if not problems.require(is_one(each), "scans", expected, Words(type(each).__name__)):
+        if not problems.require(_is_one(each, is_common), "scans", expected, Words(type(each).__name__)):
             continue
         if is_common:
             with problems.collect("scans: "):
@@ -52,16 +52,10 @@ def _check(problems: Problems) -> None:
     )
 
 
-def _is_surface(scan: Any) -> bool:
-    return isinstance(scan, xr.DataArray)
-
-
-def _is_result(scan: Any) -> bool:
-    return (
-        isinstance(scan, xr.Dataset)
-        and set(NEEDED) <= set(scan.variables)
-        and scan.sizes.get("method", 0) > 0
-    )
+def _is_one(scan: Any, is_common: bool) -> bool:
+    if is_common or not isinstance(scan, xr.Dataset):
+        return is_common and isinstance(scan, xr.DataArray)
+    return set(NEEDED) <= set(scan.variables) and scan.sizes.get("method", 0) > 0
 
 
 def _listed(scans: Any) -> list[Any]:
@@ -204,10 +198,6 @@ def _of_results(results: list[xr.Dataset], method: str | None) -> _Scans:
 def _of_surfaces(surfaces: list[xr.DataArray]) -> _Scans:
     singles = [single for surface in surfaces for single in read_surfaces(surface)]
     records = [likelihood(single, None, None) for single in singles]
-    gridded = [
-        record.gridded(single.finest_scale) if single.finest_scale else record
-        for single, record in zip(singles, records, strict=True)
-    ]
     return _Scans(
         np.array([record.hurst for record in records]),
         np.array([record.standard_error for record in records]),
@@ -215,5 +205,5 @@ def _of_surfaces(surfaces: list[xr.DataArray]) -> _Scans:
         np.array([record.scale_min for record in records]),
         np.array([record.scale_max for record in records]),
         [record.posterior for record in records],
-        np.array([a.ci_low - b.ci_low for a, b in zip(records, gridded, strict=True)]),
+        np.array([r.gridding_error(single.finest_scale) for r, single in zip(records, singles, strict=True)]),
     )

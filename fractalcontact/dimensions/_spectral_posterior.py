@@ -336,7 +336,8 @@ def posterior(
     residual = _residuals(bins, prior, form, fixed, starts)
 
     def maxima(starts: Array, residual: Array, kind: Array, attempts: int) -> tuple[Array, Array, Array]:
-        squares = _squares(residual, whitening[kind]) + np.square(starts).sum(axis=2)
+        white = residual @ whitening[kind][:, None].transpose(0, 1, 3, 2)
+        squares = np.square(white).sum(axis=3) + np.square(starts).sum(axis=2)
         best = np.argsort(squares, axis=2)[:, :, :attempts].transpose(1, 0, 2).reshape(len(starts), -1)
         near = np.take_along_axis(starts, best[:, :, None], 1)
         kind = kind.repeat(attempts)
@@ -469,11 +470,6 @@ def _residuals(bins: Bins, prior: Array, form: Array, fixed: Array, u: Array) ->
     theta = _theta(u, fixed[:, None], prior)
     model = bins.log_power(theta.reshape(-1, theta.shape[-1]), form.repeat(u.shape[1]))[0]
     return np.asarray((bins.level - model).reshape(*u.shape[:2], -1))
-
-
-def _squares(residual: Array, whitening: Array) -> Array:
-    """Return the sums of squares of the white residuals, shape (kinds, hypotheses, points)."""
-    return np.asarray(np.square(residual @ whitening[:, None].transpose(0, 1, 3, 2)).sum(axis=-1))
 
 
 def _maxima(

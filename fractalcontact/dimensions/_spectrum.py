@@ -35,7 +35,7 @@ _NAMES = {2: "power_spectral_density", 1: "profile_power_spectral_density"}  # b
 def _check(problems: Problems) -> None:
     given = problems.given
     reserved = (*_NAMES.values(), "wavenumber", "wavelength", "mode_count", *ALWAYS)
-    is_valid = check_surface(problems, smallest=4, gaps=False, squares=True, reserved=reserved)
+    is_valid = check_surface(problems, smallest=4, gaps=False, reserved=reserved)
     if given.window is not None:
         problems.choice("window", among=("auto", "hann", "none"))
     if problems.integer("tile", at_least=8, optional=True) and is_valid and given.tile is not None:

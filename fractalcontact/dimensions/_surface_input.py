@@ -75,15 +75,6 @@ class Surface:
         data = self.stack.variable.data[self.index]
         return np.asarray(data, dtype=np.float64).reshape(self.shape)
 
-    @property
-    def squares_overflow(self) -> bool:
-        """Whether squares of the heights in m would overflow or underflow."""
-        return not self.is_lazy and not SMALLEST_UNIT <= self.unit <= LARGEST_UNIT and not self.is_constant
-
-    def in_own_unit(self) -> Surface:
-        """Return the same surface with the scaled heights taken as metres."""
-        return Surface(self.stack, self.grid, self.index, 1.0, self.heights, self._is_plane)
-
     def with_heights(self, heights: Array) -> Surface:
         """Return a surface with other scaled heights in the same unit."""
         return Surface(self.stack, self.grid, self.index, self.unit, heights)
@@ -225,14 +216,10 @@ class Surface:
         heights = self.heights[observed] - self.heights[observed].mean()
         return float(np.abs(heights - q @ (q.T @ heights)).max())
 
-    def slabs(self, overlap: int, unit: float = 1.0) -> Iterator[tuple[Array, int]]:
-        """Yield slabs of rows in m, each with up to `overlap` rows of the next and the number of its own.
-
-        Heights in memory are divided by `unit`, a power of two.
-        """
+    def slabs(self, overlap: int) -> Iterator[tuple[Array, int]]:
+        """Yield slabs of rows in m, each with up to `overlap` rows of the next and the number of its own."""
         if not self.is_lazy or self.axes == 1:
-            raw = self.raw if unit == 1.0 else self.raw / unit
-            yield np.ascontiguousarray(raw), self.shape[0]
+            yield np.ascontiguousarray(self.raw), self.shape[0]
             return
         ny, nx = self.shape
         rows = max(SLAB // nx, 4 * overlap, 1)
@@ -259,7 +246,6 @@ def check_surface(
     smallest: int = 3,
     gaps: bool = True,
     profile: bool = True,
-    squares: bool = False,
     reserved: Collection[str] = (),
 ) -> bool:
     """Check the argument `surface`; `read_surfaces` then splits it.
@@ -273,8 +259,6 @@ def check_surface(
         Allow a profile, dims (..., x), beside planes, dims (..., y, x).
     gaps : bool
         Allow NaN.
-    squares : bool
-        The squares of the heights in m must be finite numbers.
     reserved : collection of str
         Names of the result, which no leading dim may have.
     """
@@ -287,7 +271,7 @@ def check_surface(
         return len(problems.messages) == before
     axes = len(_core_dims(surface))
     _check_heights(problems, surface.values, axes, gaps)
-    if len(problems.messages) == before and squares:
+    if len(problems.messages) == before:
         _check_squares(problems, np.asarray(surface.values).reshape(-1, int(np.prod(surface.shape[-axes:]))))
     return len(problems.messages) == before
 

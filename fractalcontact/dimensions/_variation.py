@@ -20,9 +20,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    is_valid = check_surface(
-        problems, squares=True, reserved=("variation", "window_size", "pair_count", *ALWAYS)
-    )
+    is_valid = check_surface(problems, reserved=("variation", "window_size", "pair_count", *ALWAYS))
     problems.choice("windows", among=("segments", "squares"))
     problems.choice("mean", among=("arithmetic", "geometric"))
     if given.sizes is not None and problems.numbers("sizes", above=0) and is_valid:
@@ -162,7 +160,7 @@ SOURCE = (
 def _check_lacunarity(problems: Problems) -> None:
     problems.choice("mass", among=("range", "sum"))
     reserved = ("lacunarity", "window_size", "pair_count", *ALWAYS)
-    check_surface(problems, squares=True, reserved=reserved)
+    check_surface(problems, reserved=reserved)
 
 
 @public_result(

@@ -30,7 +30,7 @@ _NAMES = ("variogram", "madogram", "second_variogram", "lag", "pair_count", *ALW
 def _check(problems: Problems) -> None:
     given = problems.given
     problems.choice("increments", among=("square", "absolute", "second"))
-    is_valid = check_surface(problems, squares=True, reserved=_NAMES)
+    is_valid = check_surface(problems, reserved=_NAMES)
     if problems.number("max_lag", above=0, optional=True) and is_valid and given.max_lag is not None:
         dims = ("y", "x") if "y" in given.surface.dims else ("x",)
         shortest = min(read_grid(given.surface, dims).spacing)
@@ -326,10 +326,7 @@ def _all_lags(heights: Array, periodic: tuple[bool, bool]) -> tuple[Array, Array
         Lags along y in the order of a transform of my points, lags along x ascending from 0.
     """
     ny, nx = heights.shape
-    torus = (
-        ny if periodic[0] else fft.fast_length(2 * ny),
-        nx if periodic[1] else fft.fast_length(2 * nx),
-    )
+    torus = (ny if periodic[0] else fft.fast_length(2 * ny), nx if periodic[1] else fft.fast_length(2 * nx))
     observed = np.isfinite(heights)
     centred = np.where(observed, heights - heights[observed].mean(), 0.0)
     planes = []

@@ -23,12 +23,7 @@ from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._spectrum import without_trend
-from fractalcontact.dimensions._surface_input import (
-    Surface,
-    check_surface,
-    middle_slices,
-    read_surfaces,
-)
+from fractalcontact.dimensions._surface_input import Surface, check_surface, middle_slices, read_surfaces
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -12,11 +12,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def square_windows(
-    surface: Surface,
-    window: Scales = None,
-    *,
-    smallest: tuple[float, ...] = (1.0,),
-    share: float = 0.5,
+    surface: Surface, window: Scales = None, *, smallest: tuple[float, ...] = (1.0,), share: float = 0.5
 ) -> tuple[Array, Array]:
     """Return edges of square windows, doubling from `smallest` coarse spacings to `share` of the surface.
 

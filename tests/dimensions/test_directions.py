@@ -478,7 +478,7 @@ def test_known_noise_and_blur_under_an_oblique_lay():
 
 
 def test_surfaces_without_an_oblique_lay_keep_the_cosine_modes():
-    from fractalcontact.dimensions._first_fit import first_fit
+    from fractalcontact.dimensions._mode_fit import first_fit
     from fractalcontact.dimensions._surface_input import read_surfaces
 
     def is_oblique(surface):

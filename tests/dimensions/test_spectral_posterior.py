@@ -5,8 +5,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.dimensions import _spectral_posterior as sp
-from fractalcontact.dimensions._first_fit import first_fit
-from fractalcontact.dimensions._likelihood import fitted_modes
+from fractalcontact.dimensions._mode_fit import first_fit, fitted_modes
 from fractalcontact.dimensions._surface_input import read_surfaces
 
 
