@@ -139,11 +139,6 @@ def _taper(n: int) -> Array:
     return np.minimum(taper, taper[::-1])
 
 
-def _means(group: Array, values: Array, weight: Array) -> Array:
-    """Return the weighted means of the values of each group; 0 without a weight."""
-    return np.asarray(np.bincount(group, weight * values) / np.maximum(np.bincount(group, weight), 1e-300))
-
-
 def _rings(lnq: Array) -> Array:
     """Return the ring of each mode."""
     return np.asarray((lnq - lnq.min(initial=np.inf)) * (PER_OCTAVE / math.log(2.0)) + 1e-9).astype(int)
@@ -231,7 +226,8 @@ class Classes:
 
     def by_ring(self, values: Array, weight: Array) -> Array:
         """Return the weighted mean in each ring; 0 without a weight."""
-        return _means(self.ring, values, weight)
+        total = np.maximum(np.bincount(self.ring, weight), 1e-300)
+        return np.asarray(np.bincount(self.ring, weight * values) / total)
 
     def excess(self, relative: Array) -> Array:
         """Return the level over a power, `relative` to that expected, over the mean of the ring, less one."""

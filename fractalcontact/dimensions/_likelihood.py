@@ -70,9 +70,8 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     if first is None:
         return undefined(NO_MODES)
     known = known.over(first.scale * surface.unit, rounding_noise(surface) / first.scale)
-    estimate = _of_azimuths(surface, first, window, known) if first.is_oblique else None
-    if estimate is None:
-        estimate = _of_modes(surface, first, window, known)
+    turned = _of_azimuths(surface, first, window, known) if first.is_oblique else None
+    estimate = turned or _of_modes(surface, first, window, known)
     return replace(estimate, note=joined(marks, estimate.note))
 
 

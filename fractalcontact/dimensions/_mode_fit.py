@@ -198,14 +198,14 @@ def fitted_modes(first: FirstFit, *, rounds: int = 12) -> ModeFit | None:
     modes = lattice.power(first.filled)
     correction: Array | float = 1.0
     information: Array | float = 1.0
-    pilot = expected_power(lattice, theta, form)
-    for _ in range(rounds):
+    pilot, is_settled = expected_power(lattice, theta, form), False
+    for left in range(rounds, 0, -1):
         clean = expected_power(lattice, theta, form, edges=False)
         sharp = theta.copy()
         sharp[SPREAD] = 0.0
         unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
         keep = clear_modes(pilot, clean, unblurred)
-        if not is_complete:
+        if not is_complete and not is_settled:
             correction = filling_ratio(lattice, pilot, observed)
             information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
         power = modes if is_complete else modes / correction
@@ -216,6 +216,8 @@ def fitted_modes(first: FirstFit, *, rounds: int = 12) -> ModeFit | None:
         keep &= ~single_waves(lattice, ratio, keep)
         levels = levels_by_azimuth(lattice, ratio, keep)
         level = lay(lattice, levels)
+        if is_settled:
+            break
         uv, _, share = log_ratio(levels, np.array([math.log(lattice.stretch), 0.0]), levels.slope(unblurred))
         stretch = math.exp(share * uv[0])
         if is_complete and lattice.stretch == stretch == 1.0:
@@ -226,8 +228,7 @@ def fitted_modes(first: FirstFit, *, rounds: int = 12) -> ModeFit | None:
             form = hypothesis.form
         lattice = replace(lattice, stretch=stretch)
         before, pilot = pilot, expected_power(lattice, theta, form)
-        if np.ptp(np.log(pilot[keep] / before[keep])) < SETTLED:
-            break
+        is_settled = left == 2 or bool(np.ptp(np.log(pilot[keep] / before[keep])) < SETTLED)
     information = information / unevenness(first.heights)
     return ModeFit(lattice, power / level, pilot, keep, information, theta, form)
 
