@@ -5,6 +5,7 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
+from fractalcontact.contact import _window_solver
 from fractalcontact.contact._kernels import projected_step_sums
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet
 from fractalcontact.contact._problem import Body
@@ -98,9 +99,10 @@ def test_open_surroundings_do_not_matter(control):
     np.testing.assert_allclose(around["gap"].isel(inside), cut["gap"], atol=1e-18)
 
 
-def test_single_precision_start_same_solution():
-    """From 512 x 512 points on a solution starts in single precision; four by four tiles are as one."""
-    tile = rough(128)
+def test_single_precision_start_same_solution(monkeypatch):
+    """A large solution starts in single precision, here from 256 x 256 points on; four by four are as one."""
+    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 256 * 256)
+    tile = rough(64)
     plane = fc.surfaces.from_array(np.tile(tile.values, (4, 4)), 1e-4, periodic=True)
     double, mixed = (
         press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12) for surface in (tile, plane)

@@ -293,7 +293,7 @@ def test_summits_of_a_gaussian_surface():
 def test_work_of_persson_in_complete_contact():
     """The work of the pressure on the gap is the energy of a flattened wave, E* q a^2/8, for any gamma."""
     q, a = 2 * math.pi * 4 / SIDE, 1e-6
-    pressure = MODULUS * q * a * np.linspace(0.0, 5.0, 8001)[1:]
+    pressure = MODULUS * q * a * (np.arange(1000) + 0.5) / 200  # the middles of steps
     stiffness = theories(waves((4, a)), pressure)["interface_stiffness"].sel(theory="persson").values
     work = np.nansum(pressure / stiffness) * (pressure[1] - pressure[0])
     assert work == pytest.approx(MODULUS * q * a**2 / 8, rel=1e-3)
