@@ -433,10 +433,10 @@ def _error_against_time(options: argparse.Namespace) -> int:
     if options.out is not None:
         written = [_save_accuracy(result, Path(options.out) / "accuracy.nc", stop)]
         for name, part in () if stop else result.children.items():
-            from fractalcontact.plotting import error_against_time
+            from fractalcontact.plotting import plot
 
             written.append(f"{name}.png")
-            _write_figure(error_against_time(part.to_dataset()), Path(options.out) / written[-1])
+            _write_figure(plot(part.to_dataset()), Path(options.out) / written[-1])
         print(f"\nwritten to {options.out}: {', '.join(written)}")
     if stop:
         raise Stopped(stop.number, "the results so far are printed above")
@@ -468,9 +468,9 @@ def _estimators(options: argparse.Namespace) -> int:
     result = accuracy.estimators(**arguments, rng=options.seed, keep=file, progress=True)
     print(accuracy.summary(result))
     if file is not None:
-        from fractalcontact.plotting import estimator_errors
+        from fractalcontact.plotting import plot
 
-        _write_figure(estimator_errors(result), file.with_suffix(".png"))
+        _write_figure(plot(result), file.with_suffix(".png"))
         print(f"\nwritten to {options.out}: estimators.nc, estimators.png")
     return 0
 

@@ -2,7 +2,7 @@
 
 Tests of what all functions have in common take it from here: labels, files, coordinates of the user's own,
 wrong arguments, missing numbers, threads and processes, damaged arguments. A new function needs one line in
-`CALLS`, unless it needs `SAMPLES` alone, or is a figure with the name of a function.
+`CALLS`, unless it needs `SAMPLES` alone, or is a kind of figure with the name of a function.
 """
 
 import functools
@@ -16,6 +16,7 @@ import skimage as ski
 import xarray as xr
 
 import fractalcontact as fc
+from fractalcontact.plotting._draw import KINDS
 
 SPACING = 1e-4
 PLACE = Path(tempfile.gettempdir()) / "fractalcontact_calls"
@@ -217,27 +218,28 @@ CALLS = {
     "scenes.template": lambda: {"question": "roughness", "scan": file("scan"), "folder": PLACE},
     "plotting.surface": lambda: {"surface": rough(), "block": rough()[:8, :8]},
     "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},
-    "plotting.contact_domains": lambda: {"result": pressed()},
-    "plotting.contact_area": lambda: {"result": closed()},
-    "plotting.curves": lambda: {"axes": fc.plotting.contact_area(closed())},
+    "plotting.plot contact_domains": lambda: {"result": pressed()},
+    "plotting.plot contact_area": lambda: {"result": closed()},
+    "plotting.curves": lambda: {"axes": fc.plotting.plot(closed(), "contact_area")},
+    "plotting.plot": lambda: {"result": closed()},
     "plotting.path": lambda: {
         "result": closed(), "variable": ["mean_gap", "closure"], "against": "normal_force",
     },
-    "plotting.pressure_distribution": lambda: {"result": distributed()},
-    "plotting.closure_laws": lambda: {"closure": closed(), "laws": laws()},
+    "plotting.plot pressure_distribution": lambda: {"result": distributed()},
+    "plotting.plot closure": lambda: {"result": closed(), "laws": laws()},
     "plotting.dilatancy": lambda: {"dilatancy": slid(), "direction": "E"},
     "plotting.friction": lambda: {"result": result_of("joints.friction"), "direction": "E"},
-    "plotting.first_contact": lambda: {"result": pressed()},
-    "plotting.alluvial": lambda: {"result": result_of("domains.lineage")},
-    "plotting.hydraulic_aperture": lambda: {"result": result_of("joints.transmissivity")},
+    "plotting.plot first_contact": lambda: {"result": pressed()},
+    "plotting.plot alluvial": lambda: {"result": result_of("domains.lineage")},
+    "plotting.plot hydraulic_aperture": lambda: {"result": result_of("joints.transmissivity")},
     "plotting.uplift": lambda: {"result": watered()},
     "plotting.dimensions": lambda: {"estimates": estimates()},
-    "plotting.dimension_curves": lambda: {"curves": curve(), "estimates": estimates()},
-    "plotting.scans": lambda: {"overview": overview()},
+    "plotting.plot dimension_curves": lambda: {"result": curve(), "estimates": estimates()},
+    "plotting.plot scans": lambda: {"result": overview()},
     "plotting.correlation": lambda: {"memory": result_of("joints.decorrelation_length")},
-    "plotting.error_against_time": lambda: {"measured": measured()},
-    "plotting.estimator_errors": lambda: {"bench": estimators()},
-    "plotting.slip_loops": lambda: {"result": result_of("joints.partial_slip")},
+    "plotting.plot error_against_time": lambda: {"result": measured()},
+    "plotting.plot estimator_errors": lambda: {"result": estimators()},
+    "plotting.plot slip_loops": lambda: {"result": result_of("joints.partial_slip")},
     "plotting.draw": lambda: {"tree": study(), "folder": PLACE / "figures"},
     "accuracy.benchmarks": lambda: {"subpackage": "surfaces"},
     "accuracy.summary": lambda: {"results": estimators()},
@@ -271,13 +273,27 @@ def _samples(names):
     return {name: SAMPLES[name]() for name in names}
 
 
+def function_of(name):
+    """Return a public function by its name, as `surfaces.fbm`, or of a kind, as `plotting.plot scans`."""
+    name, _, kind = name.partition(" ")
+    *subpackage, word = name.split(".")
+    module = importlib.import_module(".".join(["fractalcontact", *subpackage])) if subpackage else fc
+    return functools.partial(getattr(module, word), kind=kind) if kind else getattr(module, word)
+
+
+def figure_name(kind):
+    """Return the name of the function that draws a kind of figure, or that of `plot` with the kind."""
+    return f"plotting.{kind}" if kind in fc.plotting.__all__ else f"plotting.plot {kind}"
+
+
 def _named_alike():
     """Yield the call of every figure with the name of a function, if it has none: with its result."""
-    for name in fc.plotting.__all__:
-        source = next((f"{each}.{name}" for each in SUBPACKAGES if f"{each}.{name}" in CALLS), None)
-        if source is not None and f"plotting.{name}" not in CALLS:
-            argument = next(iter(inspect.signature(getattr(fc.plotting, name)).parameters))
-            yield f"plotting.{name}", functools.partial(_result_as, argument, source)
+    for kind in KINDS:
+        source = next((f"{each}.{kind}" for each in SUBPACKAGES if f"{each}.{kind}" in CALLS), None)
+        name = figure_name(kind)
+        if source is not None and name not in CALLS:
+            argument = next(iter(inspect.signature(function_of(name)).parameters))
+            yield name, functools.partial(_result_as, argument, source)
 
 
 def _result_as(argument, source):
@@ -297,13 +313,6 @@ LEFT_OUT = {
     "accuracy.Benchmark", "accuracy.Method",
     "scenes.Scene",
 }  # fmt: skip
-
-
-def function_of(name):
-    """Return a public function by its name, as `surfaces.fbm`."""
-    *subpackage, word = name.split(".")
-    module = importlib.import_module(".".join(["fractalcontact", *subpackage])) if subpackage else fc
-    return getattr(module, word)
 
 
 # these return an object, a number or a table of words, not labelled data

@@ -37,41 +37,13 @@ QUANTITIES = {
 
 
 @figure
-def error_against_time(measured: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
+def error_against_time(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
 
     Each point is one setting of a method. A filled point is on the Pareto front: no setting of another method
     of the benchmark has a smaller error in a shorter time.
-
-    Parameters
-    ----------
-    measured : DataTree or Dataset
-        From `fractalcontact.accuracy.measure`, or one of its groups: error, run_time (s), memory (byte) and
-        on_pareto_front over (method, setting), benchmark and error_meaning over method.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> import xarray as xr
-    >>> measured = xr.Dataset(
-    ...     {
-    ...         "error": (("method", "setting"), [[0.1, 0.02]]),
-    ...         "run_time": (("method", "setting"), [[0.01, 0.2]]),
-    ...         "memory": (("method", "setting"), [[2e6, 8e6]]),
-    ...         "on_pareto_front": (("method", "setting"), [[True, True]]),
-    ...     },
-    ...     coords={
-    ...         "method": ["fast"],
-    ...         "benchmark": ("method", ["sphere"]),
-    ...         "error_meaning": ("method", ["relative error of the force"]),
-    ...     },
-    ... )
-    >>> ((time, memory),) = fc.plotting.error_against_time(measured)
-    >>> print(time.get_xlabel(), "|", memory.get_xlabel())
-    run time (ms) | peak memory (MB)
     """
-    benchmarks = _benchmarks(measured, units)
+    benchmarks = _benchmarks(result, units)
     shape = (len(benchmarks), 2)
     shown = _style.panels(axes, shape, (8.6, 2.7 * len(benchmarks)), sharey="row")
     for row, (name, data) in zip(shown, benchmarks.items(), strict=True):
@@ -110,13 +82,13 @@ def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:
     if isinstance(measured, xr.DataTree) and measured.children:
         groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
-        groups = {"": as_dataset(measured, "measured")}
+        groups = {"": as_dataset(measured)}
     if units is not None:
         require_units(groups.values(), units)
         groups = {prefix: marked(data, units) for prefix, data in groups.items()}
     benchmarks = {}
     for prefix, data in groups.items():
-        require_variables(data, MEASURED, "measured")
+        require_variables(data, MEASURED)
         names = np.asarray(words(data["benchmark"]))
         for name in dict.fromkeys(names.tolist()):
             benchmarks[f"{prefix}{name}"] = data.isel(method=np.flatnonzero(names == name))
@@ -138,38 +110,18 @@ def _methods(names: list[str]) -> Family:
 
 
 @figure
-def estimator_errors(bench: Any, *, axes: Panels | None = None) -> AxesArray:
+def estimator_errors(result: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw the rms error over the Cramer-Rao bound and the interval coverage against the true Hurst exponent.
 
     There is one column per surface family and size, and one curve per method. An unbiased estimator has a
     ratio of at least one. A calibrated 95 % interval has a coverage of 0.95; vertical bars show the
     uncertainty due to the number of surfaces.
-
-    Parameters
-    ----------
-    bench : Dataset
-        From `fractalcontact.accuracy.estimators`: error_ratio and interval_coverage over (method, family,
-        hurst, size), with the ends of their intervals.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> import xarray as xr
-    >>> dims = ("method", "family", "hurst", "size")
-    >>> bench = xr.Dataset(
-    ...     {"error_ratio": (dims, [[[[1.1], [1.2]]]]), "interval_coverage": (dims, [[[[0.94], [0.95]]]])},
-    ...     coords={"method": ["default"], "family": ["fbm"], "hurst": [0.3, 0.8], "size": [128]},
-    ... )
-    >>> (upper,), (lower,) = fc.plotting.estimator_errors(bench)
-    >>> print(upper.get_title(), "|", lower.get_xlabel())
-    fbm, n = 128 | true Hurst exponent
     """
-    data = result_of(bench, tuple(QUANTITIES), ("method",), argument="bench")
-    require_dims(data, {dim: dim for dim in CASES}, "bench")
+    data = result_of(result, tuple(QUANTITIES), ("method",))
+    require_dims(data, {dim: dim for dim in CASES})
     with Problems("fc.plotting") as problems:
         for dim in CASES:
-            problems.require(data.sizes[dim] > 0, f"bench.{dim}", "at least one entry", NONE)
+            problems.require(data.sizes[dim] > 0, f"result.{dim}", "at least one entry", NONE)
     families, sizes = words(data["family"]), data["size"].values
     cases = list(product(range(len(families)), range(len(sizes))))
     size = (2.3 * len(cases) + 1.6, 5.2)

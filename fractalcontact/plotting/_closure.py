@@ -41,7 +41,7 @@ LAWS = {"exponential": _style.DASHED, "hyperbolic": _style.DOTTED}  # line where
 
 @figure
 def closure_laws(
-    closure: Any,
+    result: Any,
     *,
     laws: Any = None,
     shear: float | None = None,
@@ -56,37 +56,10 @@ def closure_laws(
     Thin lines show the total closure w, thick lines the interface closure w_int = w - w_b, where w_b is the
     closure of the two bodies. With `laws` points are the interface closures against the nominal pressure, of
     the first loading and beyond; the law that they prefer is a thick line, the other a thin one.
-
-    Parameters
-    ----------
-    closure : Dataset or node of a DataTree
-        From `fractalcontact.joints.closure`: closure, interface_closure (m) and normal_force (N) over
-        (shear, step), or over one of them.
-    laws : Dataset or node of a DataTree, optional
-        From `fractalcontact.joints.closure_laws` of the same closure, also with a seating pressure.
-    shear : float, optional
-        Shear displacement (m) of the curve with the marked points; the nearest one is taken.
-    marked : sequence of int
-        Steps to mark A, B, C ... on that curve.
-    key : bool
-        Add a legend of the shear displacements.
-    log : bool
-        Logarithmic axes, which show every decade of the load.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> lower = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=1.6e-3)
-    >>> result = fc.joints.closure(crack, shear=2e-4, direction="E", normal_force=[1.0, 10.0])
-    >>> ax = fc.plotting.closure_laws(result)
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    closure (µm) | normal force $F$ (N)
     """
     if laws is not None:
-        return _draw_laws(closure, laws, key, log, units, ax)
-    data = result_of(closure, ("closure", "normal_force"), PATH, units, "closure")
+        return _draw_laws(result, laws, key, log, units, ax)
+    data = result_of(result, ("closure", "normal_force"), PATH, units)
     with Problems("fc.plotting") as problems:
         last = data.sizes["step"] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
@@ -106,10 +79,10 @@ def closure_laws(
     return panel.ax
 
 
-def _draw_laws(closure: Any, laws: Any, key: bool, log: bool, units: Units | None, ax: Axes | None) -> Axes:
+def _draw_laws(result: Any, laws: Any, key: bool, log: bool, units: Units | None, ax: Axes | None) -> Axes:
     """Draw the steps of each shear and both laws through them."""
     names = ("interface_closure", "nominal_pressure")
-    data = result_of(closure, names, PATH, units, "closure")
+    data = result_of(result, names, PATH, units)
     fitted = result_of(laws, (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
     with Problems("fc.plotting") as problems:
         count, of_laws = data.sizes["shear"], fitted.sizes["shear"]
@@ -145,22 +118,6 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
 
     The aperture is zero where contacts block the flow from side to side. Broad pale lines show the
     mechanical aperture (mean gap) if the result has it.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.joints.transmissivity`: hydraulic_aperture (m) over (shear, step, axis), or
-        over some of them, and aperture (m) over (shear, step). With a single step it is drawn against shear.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e5, 1e6], keep=("gap",))
-    >>> ax = fc.plotting.hydraulic_aperture(fc.joints.transmissivity(pressed["gap"]))
-    >>> print(ax.get_ylabel())
-    hydraulic aperture (µm)
     """
     data = result_of(result, ("hydraulic_aperture",), (*PATH, "axis"), units)
     dims, x, family = path_axis(data, None)

@@ -7,6 +7,7 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.units import Scale
@@ -36,33 +37,8 @@ def contact_area(
     """Draw the real contact area as a fraction of the nominal area, one curve per shear displacement.
 
     Solid lines show the area corrected for the perimeter, thin dashed lines the count of cells in contact,
-    which is too high because a cell that is partly in contact counts fully.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.joints.closure` or `fractalcontact.contact.press`: contact_fraction,
-        corrected_contact_fraction and normal_force (N) over (shear, step), or over one of them.
-    against : str
-        Variable on the x axis: normal_force, nominal_pressure or closure.
-    theory : Dataset, optional
-        From `fractalcontact.contact.theories`: dash-dotted curves against normal_force or nominal_pressure.
-    log : bool
-        Logarithmic axes, which show every decade of the load; a dotted line is proportional to the load.
-    {shared}
-
-    References
-    ----------
-    Yastrebov, Anciaux and Molinari (2017), Journal of the Mechanics and Physics of Solids 107 (correction).
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
-    >>> ax = fc.plotting.contact_area(result, against="nominal_pressure")
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    nominal pressure (MPa) | real / nominal contact area (%)
+    which is too high because a cell that is partly in contact counts fully (Yastrebov, Anciaux and Molinari
+    2017, Journal of the Mechanics and Physics of Solids 107).
     """
     data = result_of(result, ("contact_fraction", against), PATH, units)
     loads, shears, name = _paths.loads_of(data, against), _paths.by_shear(data), "real / nominal contact area"
@@ -104,7 +80,7 @@ def _draw_theories(panel: LinePanel, theory: Any, name: str, against: str) -> No
 @figure
 def path(
     result: Any,
-    variable: str | Sequence[str],
+    variable: str | Sequence[str] | None = None,
     *,
     against: str | None = None,
     theory: Any = None,
@@ -123,8 +99,9 @@ def path(
         Any result over (shear, step), or over one of them: from `fractalcontact.contact.press`,
         `fractalcontact.joints.closure`, `fractalcontact.joints.closure_laws`,
         `fractalcontact.domains.evolution`.
-    variable : str or sequence of str
-        Name of the variable, or of several of one unit, which get a line style each.
+    variable : str or sequence of str, optional
+        Name of the variable, or of several of one unit, which get a line style each. Default: the name of a
+        DataArray, or the variables that the result states in its attribute `path_figure`.
     theory : Dataset, optional
         From `fractalcontact.contact.theories`: dash-dotted curves against nominal_pressure or normal_force.
     log : bool, optional
@@ -140,6 +117,8 @@ def path(
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | mean gap (µm)
     """
+    if variable is None:
+        variable = _own_variables(result)
     names = (variable,) if isinstance(variable, str) else tuple(variable)
     given = () if against is None else (against,)
     data = result_of(result, (*names, *given), PATH, units)
@@ -162,31 +141,20 @@ def path(
     return panel.finish(log=wide if log is None else "xy" * log, title="" if theory is None else "theory")
 
 
+def _own_variables(result: Any) -> list[str]:
+    """Return the name of a DataArray, or the variables that a result states for its figure."""
+    is_one = isinstance(result, xr.DataArray) and result.name is not None
+    names = [str(result.name)] if is_one else str(result.attrs.get("path_figure", "")).split()
+    with Problems("fc.plotting") as problems:
+        problems.require(bool(names), "variable", f"one of {list(result)}, for there is no standard", NONE)
+    return names
+
+
 @figure
 def pressure_distribution(
     result: Any, *, theory: Any = None, units: Units | None = None, ax: Axes | None = None
 ) -> Axes:
-    """Draw how the nominal area is distributed over the pressures, one curve per step.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.contact.press` with ``include="pressure_distribution"``.
-    theory : Dataset, optional
-        From `fractalcontact.contact.theories`: dash-dotted curves of Persson (2001), a Gaussian about the
-        nominal pressure less that about its negative.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.spectral((32, 32), 1e-5, hurst=0.8, rms_slope=0.1, rng=1)
-    >>> loads = {"contact_modulus": 1e9, "nominal_pressure": [1e7, 4e7]}
-    >>> pressed = fc.contact.press(surface, include="pressure_distribution", **loads)
-    >>> ax = fc.plotting.pressure_distribution(pressed)
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    pressure (MPa) | nominal area per pressure (1/MPa)
-    """
+    """Draw how the nominal area is distributed over the pressures, one curve per step."""
     names = ("area_share", "maximum_pressure", "pressure_class", "nominal_pressure")
     data = result_of(result, names, ("step",), units)
     require_dims(data, {"area_share": "pressure_class"})
@@ -233,22 +201,6 @@ def area_by_resolution(
 
     Solid lines are the cells in contact, dashed lines the area corrected for their perimeter. The slope of a
     straight line would be 2 less the dimension by area.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.joints.area_by_resolution`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
-    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
-    >>> areas = fc.joints.area_by_resolution(crack, shear=4e-4, nominal_pressure=[1e6, 1e7])
-    >>> ax = fc.plotting.area_by_resolution(areas)
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    spacing (µm) | real contact area (%)
     """
     names = ("contact_fraction", "corrected_contact_fraction", "resolution")
     result = result_of(result, names, ("shear", "step", "resolution"), units)
@@ -267,30 +219,7 @@ def area_by_resolution(
 
 @figure
 def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
-    """Draw tangential force against displacement, and the part of the contact that sticks against the force.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.contact.partial_slip` or `fractalcontact.joints.partial_slip`, over step or
-        (shear, step).
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> result = fc.contact.partial_slip(
-    ...     surface,
-    ...     contact_modulus=1e9,
-    ...     poisson=0.2,
-    ...     friction_coefficient=0.5,
-    ...     normal_force=10.0,
-    ...     tangential_force=[0.0, 3.0, -3.0, 3.0],
-    ... )
-    >>> print(fc.plotting.slip_loops(result)[0].get_ylabel())
-    tangential force $Q$ (N)
-    """
+    """Draw tangential force against displacement, and the sticking part of the contact against the force."""
     names = ("tangential_force", "tangential_displacement", "stick_area", "contact_area")
     data = result_of(result, names, PATH, units)
     force, displacement, stuck, contact = (quantity(data, name, PATH) for name in names)

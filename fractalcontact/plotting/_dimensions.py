@@ -39,29 +39,10 @@ ESTIMATES = ("hurst", "fractal_dimension", "scale_min", "scale_max")
 
 @figure
 def dimension_curves(
-    curves: Any, estimates: Any = None, *, units: Units | None = None, axes: Panels | None = None
+    result: Any, *, estimates: Any = None, units: Units | None = None, axes: Panels | None = None
 ) -> AxesArray:
-    """Draw scaling curves with their local slopes, and the fitted window and slope.
-
-    Parameters
-    ----------
-    curves : mapping of str to Dataset, Dataset, or node of a DataTree
-        From `fractalcontact.dimensions.spectrum`, `.variogram`, `.cube_counts` ..., by name. The node
-        /dimensions of a study holds the curves as children, and the estimates.
-    estimates : Dataset, optional
-        From `fractalcontact.dimensions.estimate`. For a method of the same name its window (scale_min,
-        scale_max, in m) is shaded, and the slope of its exponent is drawn in that window and written.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> (upper,), (lower,) = fc.plotting.dimension_curves(fc.dimensions.variogram(surface))
-    >>> print(upper.get_ylabel(), "|", lower.get_xlabel())
-    variogram (µm²) | lag (mm)
-    """
-    datasets, fits = _curves_in(curves, estimates, units)
+    """Draw scaling curves with their local slopes, and the fitted window and slope."""
+    datasets, fits = _curves_in(result, estimates, units)
     names = list(datasets)
     columns = _style.number_of_columns(len(names))
     rows = -(-len(names) // columns)
@@ -95,13 +76,13 @@ def _curves_in(
     else:
         is_one = not isinstance(curves, Mapping) or isinstance(curves, xr.Dataset | xr.DataTree)
         by_name = {"": curves} if is_one else curves
-    datasets = {str(name): as_dataset(curve, "curves") for name, curve in by_name.items()}
+    datasets = {str(name): as_dataset(curve) for name, curve in by_name.items()}
     if units is not None:
         require_units(datasets.values(), units)
         datasets = {name: marked(curve, units) for name, curve in datasets.items()}
     datasets = {name or curve_of(curve)[1]: curve for name, curve in datasets.items() if curve_of(curve)[1]}
     with Problems("fc.plotting") as problems:
-        problems.require(bool(datasets), "curves", f"a variable out of {', '.join(CURVES)}", NONE)
+        problems.require(bool(datasets), "result", f"a variable out of {', '.join(CURVES)}", NONE)
     if estimates is not None:
         estimates = result_of(estimates, ESTIMATES, ("method",), argument="estimates")
     return datasets, estimates
@@ -126,9 +107,9 @@ def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
 
 def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
     scale, value = curve_of(curve)
-    curve = result_of(curve, (scale, value), (), argument="curves")
+    curve = result_of(curve, (scale, value), ())
     with Problems("fc.plotting") as problems:
-        problems.require(curve[scale].ndim == 1, "curves", f"{scale} along one dim", curve[scale].dims)
+        problems.require(curve[scale].ndim == 1, "result", f"{scale} along one dim", curve[scale].dims)
     dims = curve[scale].dims
     x, y = quantity(curve, scale, dims), quantity(curve, value, dims)
     slopes = table(curve, "local_slope", dims) if "local_slope" in curve else np.full(y.values.shape, np.nan)

@@ -1,13 +1,16 @@
-"""All figures of a study, written as PNG files."""
+"""The standard figure of a result, the numbers of its curves, and all figures of a study as files."""
 
 from __future__ import annotations
 
 import functools
+import inspect
 import os
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base.files import written_whole
@@ -15,8 +18,9 @@ from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import group_of, member_count
-from fractalcontact.base.validation import Problems, writing
+from fractalcontact.base.validation import NONE, Problems, Words, writing
 from fractalcontact.plotting import (
+    _accuracy,
     _closure,
     _contact_curves,
     _dimensions,
@@ -27,11 +31,10 @@ from fractalcontact.plotting import (
     _strength,
 )
 from fractalcontact.plotting._contact_curves import path
-from fractalcontact.plotting._curves import curves
 from fractalcontact.plotting._dimensions import curve_of
 from fractalcontact.plotting._ensemble import draw_with_band, reduced_trees
-from fractalcontact.plotting._figure import StudyFigure
-from fractalcontact.plotting._style import Figure, drawn_for_files, figure_of
+from fractalcontact.plotting._figure import LABELLED, Drawing, StudyFigure
+from fractalcontact.plotting._style import Axes, Figure, drawn_for_files, figure_of
 from fractalcontact.plotting._units import UNITS_EXPECTED, Units, marked, require_units
 
 WHERE = "fc.plotting.draw"
@@ -40,16 +43,135 @@ SOFTWARE = {"Software": "fractalcontact"}  # of a PNG file: a run overwrites no 
 
 
 # of all modules; of several with one file the first with data is drawn
-FIGURES = (
-    *_ensemble.FIGURES,
-    *_closure.FIGURES,
-    *_contact_curves.FIGURES,
-    *_fields.FIGURES,
-    *_strength.FIGURES,
-    *_dimensions.FIGURES,
-    *_size_curves.FIGURES,
-    *_islands.FIGURES,
-)
+MODULES = (_ensemble, _closure, _contact_curves, _fields, _strength, _dimensions, _size_curves, _islands)
+FIGURES = tuple(row for module in MODULES for row in module.FIGURES)
+OF_SEVERAL: dict[str, tuple[Drawing, tuple[str, ...]]] = {
+    "error_against_time": (_accuracy.error_against_time, ("on_pareto_front",)),
+    "dimension_curves": (_dimensions.dimension_curves, tuple(_dimensions.CURVES)),
+}
+# drawing of each kind, and variables that tell whose standard figure it is: a result has that of the first
+KINDS: dict[str, tuple[Drawing, tuple[str, ...]]] = {
+    "scans": (_ensemble.scans, ("status",)),
+    "estimator_errors": (_accuracy.estimator_errors, ("error_ratio",)),
+    "shear_curve": (_strength.shear_curve, ("shear_stress",)),
+    "strength_envelope": (_strength.strength_envelope, ("in_range",)),
+    "self_weight": (_strength.self_weight, ("strength_exponent",)),
+    "friction": (_strength.friction, ("friction_angle",)),
+    "area_by_resolution": (_contact_curves.area_by_resolution, ("area_dimension",)),
+    "delta_dimension": (_strength.delta_dimension, ("covering_dimension",)),
+    "correlation": (_strength.correlation, ("decorrelation_length",)),
+    "directional_roughness": (_dimensions.directional_roughness, ("roughness_metric",)),
+    "uplift": (_closure.uplift, ("uplift_profile",)),
+    "hydraulic_aperture": (_closure.hydraulic_aperture, ("hydraulic_aperture",)),
+    "slip_loops": (_contact_curves.slip_loops, ("stick_area",)),
+    "dilatancy": (_strength.dilatancy, ("dilatancy", "rigid_dilatancy")),
+    "closure": (_closure.closure_laws, ("contact_fraction",)),
+    "contact_area": (_contact_curves.contact_area, ()),
+    "contact_domains": (_fields.contact_domains, ("state", "slip_state")),
+    "first_contact": (_fields.first_contact, ()),
+    "pressure_distribution": (_contact_curves.pressure_distribution, ()),
+    "alluvial": (_islands.alluvial, ("common_cells",)),
+    "evolution": (_islands.evolution, ("births",)),
+    "islands": (_islands.islands, ("area",)),
+    "lacunarity": (_size_curves.lacunarity, ("lacunarity",)),
+    "box_dimension": (_size_curves.box_dimension, _size_curves.DIMENSIONS),
+    "signature": (_size_curves.signature, ("spot_size", "box_count")),
+    "scaling": (_dimensions.scaling, ("window_hurst",)),
+    "dimensions": (_dimensions.dimensions, ("fractal_dimension",)),
+    **OF_SEVERAL,
+    "surface": (_fields.surface, ("height",)),
+    "field": (_fields.field, ()),
+    "path": (path, ()),
+}
+
+
+def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
+    """Draw the standard figure of a result of any function, or another kind of figure of it.
+
+    Parameters
+    ----------
+    result : Dataset, DataArray, or node of a DataTree
+        From any function of fractalcontact, as computed or as read back from a file.
+    kind : str, optional
+        Default: the standard figure of the result. One that has no other is drawn along its path of load or
+        shear; a map of a field in colours. The kinds, with their options and where they are the standard:
+
+        - closure (`laws`, `shear`, `marked`, `key`, `log`): normal force against total (thin) and interface
+          closure; with `laws` of `joints.closure_laws` these through its steps. `contact.press`,
+          `joints.closure`.
+        - contact_area (`against`, `theory`, `log`): share in contact, corrected for the perimeter and as
+          counted (dashed), with the curves of `contact.theories`.
+        - contact_domains (`shear` or `normal_force`, `panels`, `zoom`): maps of contact, or of stick and
+          slip, along a path, with a magnified window `zoom` (m) wide.
+        - first_contact (`shear`): map of the load at which each cell first touches.
+        - pressure_distribution (`theory`): of `press(include="pressure_distribution")`, and Persson's.
+        - slip_loops: force over displacement, and the part that sticks. `partial_slip`.
+        - hydraulic_aperture: against load or shear, mean gap pale. `joints.transmissivity`.
+        - shear_curve (`beside`, drawn dashed): stress and dilatancy. `joints.shear_curve`, `direct_shear`.
+        - self_weight, area_by_resolution (`shear`), delta_dimension: of `joints` functions of that name.
+        - alluvial (`shear`): how islands grow and merge. `domains.lineage`.
+        - dimension_curves (`estimates`): scaling curves, one or several by name, their local slopes and the
+          windows and fits of `dimensions.estimate`. `dimensions.variogram`, `.spectrum` ...
+        - scans: dots of the main numbers of many scans. Group `overview` of a study.
+        - error_against_time, estimator_errors: `accuracy.measure`, where points on the Pareto front are
+          filled, and `accuracy.estimators`.
+
+        Figures with a function of their own, such as `dilatancy`, are kinds too.
+    **options
+        `units` by name of a variable, `ax` or `axes` to draw into, and those of the kind.
+
+    Returns
+    -------
+    Axes, or array of Axes
+        The panel, or the panels where the figure can have several.
+
+    Raises
+    ------
+    InvalidInput
+        The result has no such figure, or an option is not one of the kind.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    >>> print(fc.plotting.plot(pressed).get_ylabel())
+    normal force $F$ (N)
+    >>> ax = fc.plotting.plot(pressed, "contact_area", against="nominal_pressure", log=True)
+    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
+    nominal pressure (MPa) | real / nominal contact area (%)
+    >>> print(fc.plotting.plot(pressed["mean_gap"]).get_ylabel())
+    mean gap (µm)
+    """
+    where = "fc.plotting.plot"
+    with Problems(where) as problems:
+        expected, is_labelled = LABELLED
+        problems.require(is_labelled(result), "result", expected, Words(type(result).__name__))
+        if kind is not None:
+            problems.choice("kind", kind, KINDS)
+    with Problems(where) as problems:
+        draw_kind: Drawing = KINDS[kind or _standard_kind(result)][0]
+        for name in options:
+            problems.choice("options", name, list(inspect.signature(draw_kind).parameters)[1:])
+    with Problems(where):
+        return draw_kind(result, **options)
+
+
+def _standard_kind(result: Any) -> str:
+    """Return the kind of the first of `KINDS` that tells a result by its variables."""
+    is_one = isinstance(result, xr.Dataset | xr.DataArray) or getattr(result, "has_data", False)
+    kinds, parts = (KINDS, [result]) if is_one else (OF_SEVERAL, list(result.values()))
+    if isinstance(result, xr.DataArray):
+        names = {"height" if result.name is None else str(result.name)}
+    else:
+        names = {str(name) for part in parts for name in getattr(part, "data_vars", ())}
+    for kind, (_, variables) in kinds.items():
+        if not names.isdisjoint(variables):
+            return kind
+    with Problems("fc.plotting") as problems:
+        expected = "one result, scaling curves by name, or all of accuracy.measure; `draw` draws a study"
+        problems.require(is_one, "result", expected, NONE)
+    return "field" if isinstance(result, xr.DataArray) and {"y", "x"} <= set(result.dims) else "path"
 
 
 def draw(
@@ -123,8 +245,7 @@ def _path_figures(tree: xr.DataTree) -> Iterator[StudyFigure]:
         names = str(node.attrs.get("path_figure", "")).split()
         if names and not {"step", "shear"}.isdisjoint(node.dims):
             group = node.path.strip("/")
-            draw_path = functools.partial(path, variable=names)
-            yield StudyFigure(group.replace("/", "_"), group, names[0], draw_path)
+            yield StudyFigure(group.replace("/", "_"), group, names[0], path)
 
 
 def _draw_all(
@@ -140,7 +261,7 @@ def _draw_all(
     def draw_one(number: int) -> None:
         row = rows[number]
         drawings = [functools.partial(_draw_row, row, each) for each in trees]
-        with DRAWING_LOCK, drawn_for_files():
+        with DRAWING_LOCK, drawn_for_files(), Problems(WHERE):
             figure = figure_of(draw_with_band(drawings, members) if members else drawings[0]())
             for file in files[number]:
                 _write(figure, file)
@@ -206,3 +327,113 @@ def _write(figure: Figure, target: Path) -> None:
         else:
             date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
             figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})
+
+
+COLUMNS = ("panel", "curve", "x", "y", "x_axis", "y_axis")
+SYMBOLS = {
+    "delta": "δ", "Delta": "Δ", "Lambda": "Λ", "sigma": "σ", "tau": "τ", "theta": "θ", "mathrm": "", "bf": ""
+}  # fmt: skip
+
+
+def curves(axes: Any) -> Any:
+    """Return the numbers of the curves drawn in a figure, as a table that can be written as CSV.
+
+    Parameters
+    ----------
+    axes : Axes, or array, sequence or mapping of Axes
+        As any function of `fractalcontact.plotting` returns them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each point. The columns are the `panel` (its title, or its number), the `curve`, `x`
+        and `y` as drawn, and the labels of both axes with their units. Azimuths are in degrees. A band is
+        given by its outline, an interval by its ends. Maps are left out: their numbers are in the result.
+
+    Raises
+    ------
+    InvalidInput
+        `axes` are no Axes.
+
+    See Also
+    --------
+    fractalcontact.scenes.tables : Every number of a result, not only those of one figure, in SI units.
+    fractalcontact.plotting.draw : The figures of a study, with `formats=["png", "csv"]` also these tables.
+
+    Examples
+    --------
+    >>> import fractalcontact as fc
+    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    >>> numbers = fc.plotting.curves(fc.plotting.path(pressed, "mean_gap", against="nominal_pressure"))
+    >>> numbers.to_csv(index=False).splitlines()[0]
+    'panel,curve,x,y,x_axis,y_axis'
+    >>> numbers[["curve", "x", "x_axis"]]
+          curve     x                  x_axis
+    0  mean gap   1.0  nominal pressure (MPa)
+    1  mean gap  10.0  nominal pressure (MPa)
+    """
+    from matplotlib.axes import Axes
+
+    panels: Mapping[Any, Any] = axes if isinstance(axes, Mapping) else {1: axes}
+    if isinstance(axes, (list, tuple, np.ndarray)):
+        panels = dict(enumerate(np.ravel(np.asarray(axes, dtype=object)), 1))
+    with Problems("fc.plotting.curves") as problems:
+        are_axes = bool(panels) and all(isinstance(ax, Axes) for ax in panels.values())
+        expected = "Axes, or an array, sequence or mapping of them"
+        problems.require(are_axes, "axes", expected, type(axes).__name__)
+    rows = [row for name, ax in panels.items() for row in _of_panel(name, ax)]
+    columns = {name: ("point", [row[i] for row in rows]) for i, name in enumerate(COLUMNS)}
+    return xr.Dataset(columns).to_dataframe().reset_index(drop=True)
+
+
+def _of_panel(name: Any, ax: Axes) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of one panel."""
+    titles = (ax.get_title(loc=place) for place in ("left", "center", "right"))
+    panel = name if isinstance(name, str) else next(filter(None, map(_plain, titles)), name)
+    is_polar = ax.name == "polar"
+    labels = "azimuth (°)" if is_polar else _plain(ax.get_xlabel()), _plain(ax.get_ylabel())
+    rows = _names_of_rows(ax)
+    for curve, vertices in _labelled_points(ax):
+        if curve.startswith("_"):
+            continue
+        x, y = np.asarray(vertices, dtype=np.float64).reshape(-1, 2).T
+        points = np.stack([np.degrees(x) if is_polar else x, y], axis=1)
+        for across, up in points[np.isfinite(points).all(axis=1)].tolist():
+            yield panel, _plain(curve), across, rows.get(up, up), *labels
+
+
+def _labelled_points(ax: Axes) -> Iterator[tuple[str, Any]]:
+    """Yield the name and the points of every curve, interval and band that has a name."""
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.patches import Polygon
+
+    for line in ax.lines:
+        yield str(line.get_label()), line.get_xydata()
+    for collection in ax.collections:
+        if isinstance(collection, LineCollection):
+            segments = [points for points in collection.get_segments() if len(points)]  # none of a NaN
+            yield str(collection.get_label()), np.concatenate(segments or [np.empty((0, 2))])
+        elif isinstance(collection, PolyCollection):
+            for path in collection.get_paths():
+                yield str(collection.get_label()), path.vertices
+    for patch in ax.patches:
+        if isinstance(patch, Polygon):
+            yield str(patch.get_label()), patch.get_xy()
+
+
+def _names_of_rows(ax: Axes) -> dict[float, str]:
+    """Return what `set_yticks` was told to write at the ticks of the vertical axis, by the place."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter
+
+    is_written = isinstance(ax.yaxis.get_major_formatter(), FuncFormatter)
+    if not (isinstance(ax.yaxis.get_major_locator(), FixedLocator) and is_written):
+        return {}
+    texts = [label.get_text() for label in ax.get_yticklabels()]
+    return dict(zip(map(float, ax.get_yticks()), texts, strict=False))
+
+
+def _plain(text: str) -> str:
+    """Return the text of a label without the signs of mathematical typesetting, on one line."""
+    text = re.sub(r"\\([A-Za-z]+)", lambda match: SYMBOLS.get(match[1], match[1]), text)
+    return " ".join(re.sub(r"[${}]", "", text).split())

@@ -138,30 +138,14 @@ NOT_SHOWN = ("_low", "_high", "_error")  # endings of variables
 
 
 @figure
-def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
+def scans(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw the distribution of the main numbers of many scans: dimension, JRC, rms height, contact area.
 
     Each panel has one dot for every scan, sorted, with its interval where there is one; the dashed line is
     the median. Outliers by the modified z of Iglewicz and Hoaglin (beyond 3.5) are red, with their names. A
     number that is the same for all scans has no panel while others differ, and JRC below its scale no dot.
-
-    Parameters
-    ----------
-    overview : Dataset or node of a DataTree
-        The group `overview` of a study of many scans, from `fractalcontact.scenes.run`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> import xarray as xr
-    >>> names = ["a.sur", "b.sur", "c.sur"]
-    >>> height = ("scan", [1e-6, 2e-6, 3e-6], {"units": "m", "long_name": "rms height"})
-    >>> overview = xr.Dataset({"rms_height": height}, coords={"scan": names})
-    >>> fc.plotting.scans(overview)[0].get_xlabel()
-    'height Sq (µm)'
     """
-    data = result_of(overview, (), (SCAN,), units, "overview")
+    data = result_of(result, (), (SCAN,), units)
     if JRC in data:
         data = data.assign({JRC: data[JRC].where(data[JRC] >= 0)})
     columns = {str(name): values for name, values in data.data_vars.items() if values.dims == (SCAN,)}
@@ -170,7 +154,7 @@ def scans(overview: Any, *, units: Units | None = None, axes: Panels | None = No
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
     names = [name for name in names if data[name].max() > data[name].min()] or names
     with Problems("fc.plotting") as problems:
-        problems.require(bool(names), "overview", "numbers over scan", NONE)
+        problems.require(bool(names), "result", "numbers over scan", NONE)
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
     for ax, name in zip(shown, names, strict=False):
         _draw_distribution(ax, data, name)

@@ -41,31 +41,6 @@ def contact_domains(
     """Draw maps of the contact state, or of stick and slip, along a path of load or of shear.
 
     A further column magnifies a window, framed in the last map of each row, where the most contacts are.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        Variable `state`, or `slip_state` of `fractalcontact.contact.partial_slip`, with dims (shear, step, y,
-        x), or without shear or step.
-    shear : float, optional
-        Shear displacement (m) whose load path is shown; the nearest one is taken.
-    normal_force : float, optional
-        Normal force (N) at which the shear path is shown; the nearest step is taken.
-    panels : int
-        Largest number of maps. Along a load path they are spread evenly over the closure.
-    zoom : float, optional
-        Edge (m) of the window, 0 for none. Default: a sixth of the shorter side if the cells of a map are
-        narrower than a typographic point, else none; none on given `axes`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> result = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e5, 1e6])
-    >>> maps = fc.plotting.contact_domains(result)
-    >>> len(maps)
-    2
     """
     names = as_dataset(result).variables
     name = "slip_state" if "slip_state" in names else "state"
@@ -249,23 +224,6 @@ def first_contact(
 
     Cells that never touch are pale. Where sets grow with load, the contact domain at a load is all cells up
     to its colour.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        Variable `state` with dims (shear, step, y, x), or without shear, and the load of each step: from
-        `fractalcontact.contact.press` or `fractalcontact.joints.closure`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> loads = [1e5, 1e6, 1e7]
-    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=loads, keep=("state",))
-    >>> ax = fc.plotting.first_contact(pressed)
-    >>> print(ax.figure.axes[1].get_ylabel())
-    normal force $F$ of first contact (N)
     """
     data = result_of(result, ("state",), PATH, units)
     require_known_dims(data, {"state": (*PATH, "y", "x")})

@@ -133,7 +133,7 @@ def _are_words(value: Any) -> bool:
     return isinstance(value, (list, tuple)) and all(isinstance(word, str) for word in value)
 
 
-LABELLED = (
+LABELLED: tuple[str, Test] = (
     "a labelled result (Dataset, DataArray or node of a DataTree)",
     lambda value: isinstance(value, (xr.DataArray, Mapping)),
 )

@@ -188,22 +188,6 @@ def alluvial(
     Each state is a stack of its islands. A ribbon is as wide as the cells that an island shares with one of
     the next state; what no ribbon reaches is new contact. The 20 largest islands of the last state have a
     colour each, and so has every island that grows into one of them: a merge tree. The others are grey.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.domains.lineage`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
-    >>> loads = [1e5, 1e6, 1e7]
-    >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=loads, keep=("state",))
-    >>> ax = fc.plotting.alluvial(fc.domains.lineage(pressed["state"]))
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    normal force $F$ (N) | cells in contact
     """
     data = result_of(result, COLUMNS, ("shear",), units)
     path = at_shear(data, shear)

@@ -81,26 +81,7 @@ DIMS = ("nominal_pressure", "shear_displacement")
 def shear_curve(
     result: Any, *, beside: Any | None = None, units: Units | None = None, axes: Panels | None = None
 ) -> AxesArray:
-    r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.joints.direct_shear` or `fractalcontact.joints.shear_curve`.
-    beside : Dataset or node of a DataTree, optional
-        Such a result to draw dashed, in the colours of the same normal stresses.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> surface = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
-    >>> result = fc.joints.shear_curve(
-    ...     surface, [0, 1e-3, 5e-3], nominal_pressure=1e6, wall_strength=6e7, residual_friction_angle=30
-    ... )
-    >>> print(fc.plotting.shear_curve(result)[0].get_ylabel())
-    shear stress $\tau$ (MPa)
-    """
+    r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress."""
     data = [_read(each, units) for each in (result, beside) if each is not None]
     shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1), sharex=True)
     every = {
@@ -212,22 +193,6 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
 
     One colour for each direction of sliding, one line style for each shear. A grey line is the strength for
     the basic friction angle alone, which grows as the size. Curves are missing where the faces lock.
-
-    Parameters
-    ----------
-    result : Dataset or node of a DataTree
-        From `fractalcontact.joints.self_weight`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> face = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
-    >>> crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=3.2e-3)
-    >>> strength = fc.joints.self_weight(crack, structure_size=[10, 100], unit_weight=24e3, shear=1e-3)
-    >>> ax = fc.plotting.self_weight(strength)
-    >>> print(ax.get_xlabel(), ax.get_xscale(), ax.get_yscale())
-    size of the structure (m) log log
     """
     names = ("shear_strength", "structure_size", "nominal_pressure", "basic_friction_angle", "shear")
     dims = ("shear", "direction", "structure_size")
@@ -364,26 +329,9 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
 
 
 @figure
-def delta_dimension(dimension: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
-    """Draw the fractal dimension of the delta-surface against shear displacement, one curve per method.
-
-    Parameters
-    ----------
-    dimension : Dataset or node of a DataTree
-        From `fractalcontact.joints.delta_dimension`.
-    {shared}
-
-    Examples
-    --------
-    >>> import fractalcontact as fc
-    >>> import xarray as xr
-    >>> names = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
-    >>> result = xr.Dataset({name: ("shear", [2.1, 2.2]) for name in names}, {"shear": [1e-4, 1e-3]})
-    >>> ax = fc.plotting.delta_dimension(result)
-    >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
-    shear displacement $v$ (mm) | dimension of the delta-surface
-    """
-    data = result_of(dimension, (*DIMENSIONS, "shear"), ("shear",), units, "dimension")
+def delta_dimension(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the fractal dimension of the delta-surface against shear displacement, one curve per method."""
+    data = result_of(result, (*DIMENSIONS, "shear"), ("shear",), units)
     shear = quantity(data, "shear", ("shear",))
     values = quantity(data, DIMENSIONS[0], ("shear",), "dimension of the delta-surface")
     methods = distinct([name.split("_")[0] for name in DIMENSIONS], "method")

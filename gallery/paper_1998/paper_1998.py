@@ -736,8 +736,8 @@ def figure_3(study):
     """Closure laws and real contact area, over the shears."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.4, 3.3), layout="constrained")
     closure = group(study, "joints/closure")
-    fc.plotting.closure_laws(closure, shear=MIDDLE, ax=left)
-    fc.plotting.contact_area(closure, ax=right)
+    fc.plotting.plot(closure, shear=MIDDLE, ax=left)
+    fc.plotting.plot(closure, "contact_area", ax=right)
     left.set_title("closure laws")
     right.set_title("real contact area")
     return figure
@@ -745,7 +745,7 @@ def figure_3(study):
 
 def figure_4(study):
     """Contact domains for increasing force at one shear."""
-    return fc.plotting.contact_domains(group(study, "joints/closure"), shear=MIDDLE)[0].figure
+    return fc.plotting.plot(group(study, "joints/closure"), "contact_domains", shear=MIDDLE)[0].figure
 
 
 def figure_5(study):
@@ -759,7 +759,7 @@ def figure_5(study):
     left.set_title("rigid surfaces")
     right.set_title("elastic bodies")
     force = float(closure["normal_force"].max())
-    fc.plotting.contact_domains(closure, normal_force=force, axes=below)
+    fc.plotting.plot(closure, "contact_domains", normal_force=force, axes=below)
     return sheet
 
 

@@ -59,14 +59,14 @@ def test_method_without_intervals_states_the_reason(small):
 
 
 def test_figure_shows_the_measured_ratios(small):
-    axes = fc.plotting.estimator_errors(small)
+    axes = fc.plotting.plot(small, "estimator_errors")
     assert [ax.get_title() for ax in axes[0]] == ["fbm, n = 32", "spectral, n = 32"]
     shown = [np.asarray(line.get_ydata()) for line in axes[0, 1].lines]
     for method in small["method"].values:
         column = small.sel({"method": method, "family": "spectral", "size": 32})
         assert any(np.array_equal(y, column["error_ratio"].values) for y in shown)
     with pytest.raises(InvalidInput, match="error_ratio"):
-        fc.plotting.estimator_errors(small.drop_vars("error_ratio"))
+        fc.plotting.plot(small.drop_vars("error_ratio"), "estimator_errors")
 
 
 def test_same_stream_gives_the_same_numbers():

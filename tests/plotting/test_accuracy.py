@@ -12,7 +12,7 @@ from fractalcontact import plotting
 
 def test_error_against_time_curves():
     measured = synthetic.accuracy()
-    axes = plotting.error_against_time(measured)
+    axes = plotting.plot(measured, "error_against_time")
     for left, right, (name, part) in zip(*axes.T, measured.children.items(), strict=True):
         assert left.get_title(loc="left").startswith(f"{name}: sphere")
         unit = {"ms": 1e-3, "µs": 1e-6, "s": 1.0}[re.search(r"\((.*)\)", left.get_xlabel()).group(1)]
@@ -31,7 +31,7 @@ def test_distinct_styles_and_narrow_cost_axis():
     expected = synthetic.accuracy()["contact"].to_dataset().isel(method=[0] * 10)
     expected["method"] = [f"method {k}" for k in range(10)]
     expected["memory"] = expected["memory"] * 0 + 1e6 * (1 + 1e-5 * np.arange(expected.sizes["setting"]))
-    ((_, right),) = plotting.error_against_time(expected)
+    ((_, right),) = plotting.plot(expected, "error_against_time")
     styles = {(line.get_color(), line.get_marker()) for line in right.lines[::2]}
     assert len(styles) == 10
     low, high = right.get_xlim()
@@ -45,7 +45,7 @@ def test_intervals_lie_within_the_axes():
               for end, value in zip(("_low", "", "_high"), three, strict=True)}  # fmt: skip
     coords = {"method": ["default"], "family": ["fbm"], "hurst": [0.3, 0.8], "size": [128]}
     bench = xr.Dataset({name: (dims, np.full((1, 1, 2, 1), value)) for name, value in values.items()}, coords)
-    (upper,), (lower,) = plotting.estimator_errors(bench)
+    (upper,), (lower,) = plotting.plot(bench, "estimator_errors")
     for ax, (first, _, last) in zip((upper, lower), ends.values(), strict=True):
         low, high = ax.get_ylim()
         assert low < first < last < high
@@ -56,6 +56,6 @@ def test_panels_of_cases_with_equal_or_unknown_sizes():
     coords = {"method": ["default"], "family": ["fbm", "fbm"], "hurst": [0.3, 0.8], "size": [128.0, np.nan]}
     ratio = np.arange(1.0, 9.0).reshape(1, 2, 2, 2)
     bench = xr.Dataset({"error_ratio": (dims, ratio), "interval_coverage": (dims, ratio / 10)}, coords)
-    upper, _ = plotting.estimator_errors(bench)
+    upper, _ = plotting.plot(bench, "estimator_errors")
     drawn = [ax.lines[0].get_ydata().tolist() for ax in upper]
     assert drawn == [[1, 3], [2, 4], [5, 7], [6, 8]]

@@ -1,5 +1,7 @@
 """Contact area against spacing, and strength against the size of the structure."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -48,7 +50,7 @@ def strengths():
 def test_area_of_every_load_at_one_shear():
     result = areas()
     for options, shear in (({}, 1), ({"shear": 7e-3}, 2)):
-        figure = figure_of(plotting.area_by_resolution(result, **options))
+        figure = figure_of(plotting.plot(result, "area_by_resolution", **options))
         ax = figure.axes[0]
         curves = drawn(ax)
         assert len(curves) == 4
@@ -61,7 +63,7 @@ def test_area_of_every_load_at_one_shear():
 
 def test_strength_of_every_direction_and_shear():
     result = strengths()
-    figure = figure_of(plotting.self_weight(result))
+    figure = figure_of(plotting.plot(result, "self_weight"))
     curves = drawn(figure.axes[0])
     assert len(curves) == 5
     for direction in range(2):
@@ -73,15 +75,19 @@ def test_strength_of_every_direction_and_shear():
 
 @pytest.mark.parametrize("dim", ["shear", "direction", "structure_size"])
 def test_strength_at_one_place_is_that_of_the_whole(dim):
-    one = drawn(figure_of(plotting.self_weight(strengths().isel({dim: 0}))).axes[0])
-    whole = drawn(figure_of(plotting.self_weight(strengths().isel({dim: [0]}))).axes[0])
+    one = drawn(figure_of(plotting.plot(strengths().isel({dim: 0}), "self_weight")).axes[0])
+    whole = drawn(figure_of(plotting.plot(strengths().isel({dim: [0]}), "self_weight")).axes[0])
     assert len(one) == len(whole) > 1
     for mine, other in zip(one, whole, strict=True):
         np.testing.assert_array_equal(np.asarray(mine), np.asarray(other))
 
 
 @pytest.mark.parametrize(
-    ("draw", "data"), [(plotting.area_by_resolution, strengths), (plotting.self_weight, areas)]
+    ("draw", "data"),
+    [
+        (partial(plotting.plot, kind="area_by_resolution"), strengths),
+        (partial(plotting.plot, kind="self_weight"), areas),
+    ],
 )
 def test_other_results_are_refused(draw, data):
     with pytest.raises(ValueError, match="expected"):

@@ -17,7 +17,7 @@ def closed():
 
 
 def test_closure_laws_curves(closed):
-    curves = drawn(plotting.closure_laws(closed))
+    curves = drawn(plotting.plot(closed, "closure"))
     for v in closed.shear:
         for name in ("closure", "interface_closure"):
             assert holds(curves, closed[name].sel(shear=v), closed.normal_force)
@@ -39,7 +39,7 @@ def test_closure_fits_are_the_laws():
     )
     for seat in (None, float(p[1])):
         laws = fc.joints.closure_laws(closure, seating_pressure=seat)
-        ax = plotting.closure_laws(closure, laws=laws)
+        ax = plotting.plot(closure, "closure", laws=laws)
         lines = [(line.get_xdata(), line.get_ydata(), line.get_linewidth()) for line in ax.lines]
         for i, preferred in enumerate((0, 1)):  # exponential, then hyperbolic: after the points of all shears
             x, y, width = lines[2 + 2 * i + preferred]
@@ -51,18 +51,18 @@ def test_closure_fits_are_the_laws():
             np.testing.assert_allclose(found, (curves[i][shown] - origin) * 1e6, rtol=2e-3)
     render(ax.figure)
     with pytest.raises(InvalidInput, match="laws: expected 2 shears"):
-        plotting.closure_laws(closure, laws=laws.isel(shear=[0]))
+        plotting.plot(closure, "closure", laws=laws.isel(shear=[0]))
 
 
 def test_marked_points(closed):
-    ax = plotting.closure_laws(closed, shear=1.6e-3, marked=[1, 3])
+    ax = plotting.plot(closed, "closure", shear=1.6e-3, marked=[1, 3])
     expected = closed.sel(shear=1.6e-3).isel(step=[1, 3])
     assert holds(drawn(ax), expected.interface_closure, expected.normal_force)
     assert [text.get_text() for text in ax.texts] == ["A", "B"]
 
 
 def test_contact_area_raw_and_corrected(closed):
-    curves = drawn(plotting.contact_area(closed))
+    curves = drawn(plotting.plot(closed, "contact_area"))
     for v in closed.shear:
         expected = closed.sel(shear=v)
         assert holds(curves, expected.normal_force, expected.contact_fraction)
@@ -70,14 +70,14 @@ def test_contact_area_raw_and_corrected(closed):
 
 
 def test_contact_area_against_closure(closed):
-    curves = drawn(plotting.contact_area(closed, against="closure"))
+    curves = drawn(plotting.plot(closed, "contact_area", against="closure"))
     assert holds(curves, closed.closure.isel(shear=0), closed.contact_fraction.isel(shear=0))
 
 
 def test_long_legend_is_thinned():
     shears = np.linspace(8e-4, 8e-3, 10)
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=shears))
-    ax = plotting.closure_laws(closed)
+    ax = plotting.plot(closed, "closure")
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert "0.8" in named
     assert "8" in named
@@ -90,8 +90,8 @@ def test_draw_into_given_axes(closed):
 
     sheet = Figure(layout="constrained")
     left, right = sheet.subplots(1, 2)
-    assert plotting.closure_laws(closed, ax=left) is left
-    assert plotting.contact_area(closed, ax=right) is right
+    assert plotting.plot(closed, "closure", ax=left) is left
+    assert plotting.plot(closed, "contact_area", ax=right) is right
     assert len(sheet.axes) == 2
 
 
@@ -99,13 +99,13 @@ def test_rc_settings_are_restored(closed):
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    plotting.closure_laws(closed)
+    plotting.plot(closed, "closure")
     assert dict(matplotlib.rcParams) == before
 
 
 def test_missing_variables_are_listed():
     with pytest.raises(InvalidInput, match="'closure'.*\n.*'normal_force'"):
-        plotting.closure_laws(synthetic.estimates())
+        plotting.plot(synthetic.estimates(), "closure")
     with pytest.raises(InvalidInput, match="labelled result"):
         plotting.box_dimension([1, 2, 3])
     with pytest.raises(InvalidInput, match="one of 'E', 'N', 'W', 'S', got 'Q'"):
@@ -117,33 +117,33 @@ def test_theories_beside_the_contact_area():
     given = {"contact_modulus": 1e9, "nominal_pressure": [1e5, 5e5, 1e6]}
     pressed, theory = fc.contact.press(surface, **given), fc.contact.theories(surface, **given)
     for against in ("nominal_pressure", "normal_force"):
-        ax = plotting.contact_area(pressed, against=against, theory=theory)
+        ax = plotting.plot(pressed, "contact_area", against=against, theory=theory)
         for name in theory.theory[:-1]:  # hertz does not hold on a rough surface, and is not drawn
             expected = theory.contact_fraction.sel(theory=name)
             assert holds(drawn(ax), expected[against], expected)
     named = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
     assert "Bush, Gibson, Thomas" in named
     with pytest.raises(InvalidInput, match="'closure'"):
-        plotting.contact_area(pressed, against="closure", theory=theory)
+        plotting.plot(pressed, "contact_area", against="closure", theory=theory)
 
 
 def test_logarithmic_axes_show_every_decade_with_a_line_proportional_to_the_load(closed):
     loaded = closed.isel(step=slice(1, None))
-    ax = plotting.contact_area(loaded, log=True)
+    ax = plotting.plot(loaded, "contact_area", log=True)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     x, y = next(line for line in ax.lines if line.get_linestyle() == ":").get_data()
     assert x == pytest.approx(np.array([0.1, 30.0]))  # kN
     assert y[1] / y[0] == pytest.approx(300.0)
-    laws = plotting.closure_laws(loaded, log=True)
+    laws = plotting.plot(loaded, "closure", log=True)
     assert (laws.get_xscale(), laws.get_yscale()) == ("log", "log")
-    assert plotting.closure_laws(loaded).get_xscale() == "linear"
+    assert plotting.plot(loaded, "closure").get_xscale() == "linear"
 
 
 @pytest.mark.parametrize("factor", [0.0, 1e-3, 1.0])
 def test_letters_do_not_overlap(closed, factor):
     near = closed.assign({name: factor * closed[name] for name in ("closure", "interface_closure")})
     near = near.assign_coords(normal_force=factor * near.normal_force)
-    ax = plotting.closure_laws(near.isel(shear=0), marked=[0, 1, 2, 3, 4])
+    ax = plotting.plot(near.isel(shear=0), "closure", marked=[0, 1, 2, 3, 4])
     ax.set_xlim(0, 1e3)
     render(ax)
     boxes = [text.get_bbox_patch().get_window_extent() for text in ax.texts]
@@ -157,7 +157,7 @@ def test_line_of_proportional_growth_ends_with_the_curves():
     fraction = np.minimum(1e-2 * loads, 1.0)
     loading = {"nominal_pressure": ("step", 1e6 * loads)}
     pressed = xr.Dataset({"contact_fraction": ("step", fraction)}, loading)
-    ax = plotting.contact_area(pressed, against="nominal_pressure", log=True)
+    ax = plotting.plot(pressed, "contact_area", against="nominal_pressure", log=True)
     (line,) = [line for line in ax.lines if line.get_label().startswith("proportional")]
     assert line.get_ydata().max() == pytest.approx(100.0)
     assert line.get_xdata().max() == pytest.approx(0.1)  # GPa

@@ -64,7 +64,7 @@ def test_stiffness_of_closure_laws(surface):
 
 
 def test_distribution_adds_up(pressed, theory):
-    ax = plotting.pressure_distribution(pressed, theory=theory)
+    ax = plotting.plot(pressed, "pressure_distribution", theory=theory)
     curves = values(ax)
     for i, (pressure, density) in enumerate(curves[::2]):
         width = pressure[1] - pressure[0]
@@ -88,7 +88,7 @@ def test_curves_are_in_a_figure_of_the_user(pressed):
 
 def test_missing_variables_are_named(pressed):
     with pytest.raises(InvalidInput, match="result: expected the variable 'area_share'"):
-        plotting.pressure_distribution(pressed[["residual"]])
+        plotting.plot(pressed[["residual"]], "pressure_distribution")
     with pytest.raises(InvalidInput, match="result: expected the variable 'mean_gap'"):
         plotting.path(pressed[["residual"]], "mean_gap")
     with pytest.raises(InvalidInput, match="against: expected a variable of every step"):
@@ -127,10 +127,10 @@ def test_any_variables_against_shear_with_an_interval():
 @pytest.mark.parametrize("chosen", [0, slice(0)])
 def test_distribution_without_classes_is_refused(chosen, pressed):
     with pytest.raises(InvalidInput, match="pressure_class"):
-        plotting.pressure_distribution(pressed.isel(pressure_class=chosen))
+        plotting.plot(pressed.isel(pressure_class=chosen), "pressure_distribution")
 
 
 def test_distribution_of_one_class_is_drawn(pressed):
-    ((pressure, _), *_) = values(plotting.pressure_distribution(pressed.isel(pressure_class=[-1])))
+    ((pressure, _), *_) = values(plotting.plot(pressed.isel(pressure_class=[-1]), "pressure_distribution"))
     greatest = float(pressed["maximum_pressure"][0]) * float(pressed["pressure_class"][-1])
     assert pressure == pytest.approx([greatest / 1e6])

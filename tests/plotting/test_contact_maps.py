@@ -16,7 +16,7 @@ def test_state_colours():
     state = closed.state.isel(shear=0, step=-1).copy()
     state.values[2, 5] = 2
     result = closed.isel(shear=0, step=-1).assign(state=state)
-    image = colours(plotting.contact_domains(result)[0])
+    image = colours(plotting.plot(result, "contact_domains")[0])
     assert np.array_equal(np.all(image == CONTACT, axis=-1), state.values == 1)
     assert np.array_equal(np.all(image == YIELDED, axis=-1), state.values == 2)
     assert np.array_equal(np.all(image == OPEN, axis=-1), state.values == 0)
@@ -24,7 +24,7 @@ def test_state_colours():
 
 def test_load_path_at_chosen_shear():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
-    axes = plotting.contact_domains(closed, shear=1.5e-3, panels=3)
+    axes = plotting.plot(closed, "contact_domains", shear=1.5e-3, panels=3)
     steps = [1, 3, 4]  # evenly over the closure, the unloaded step left out
     for ax, step in zip(axes, steps, strict=True):
         expected = closed.sel(shear=1.6e-3).isel(step=step)
@@ -36,7 +36,7 @@ def test_load_path_at_chosen_shear():
 
 def test_shear_path_at_chosen_force():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
-    axes = plotting.contact_domains(closed, normal_force=9e3)
+    axes = plotting.plot(closed, "contact_domains", normal_force=9e3)
     assert len(axes) == 3
     for ax, v in zip(axes, closed.shear, strict=True):
         assert np.array_equal(np.all(colours(ax) == CONTACT, axis=-1), closed.state.sel(shear=v, step=3) == 1)
@@ -48,16 +48,16 @@ def test_common_force_is_written_once():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3)))
     force = closed.normal_force.values * (1 + 1e-9 * np.arange(2)[:, None])
     closed = closed.assign_coords(normal_force=(("shear", "step"), force))
-    figure = figure_of(plotting.contact_domains(closed, normal_force=1e4))
+    figure = figure_of(plotting.plot(closed, "contact_domains", normal_force=1e4))
     assert figure.get_suptitle() == "$F$ = 10 kN"
     force[1] *= 1.5
     closed = closed.assign_coords(normal_force=(("shear", "step"), force))
-    assert figure_of(plotting.contact_domains(closed, normal_force=1e4)).get_suptitle() == ""
+    assert figure_of(plotting.plot(closed, "contact_domains", normal_force=1e4)).get_suptitle() == ""
 
 
 def test_unit_of_loads():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4,)), forces=(40.0, 4e3, 2e4))
-    titles = [ax.get_title(loc="left") for ax in plotting.contact_domains(closed)]
+    titles = [ax.get_title(loc="left") for ax in plotting.plot(closed, "contact_domains")]
     for title, force in zip(titles, ("0.04 kN", "4 kN", "20 kN"), strict=True):
         assert f"= {force}," in title
 
@@ -65,14 +65,14 @@ def test_unit_of_loads():
 def test_shear_or_force_must_be_chosen():
     closed = synthetic.closure(synthetic.delta(synthetic.heights()))
     with pytest.raises(InvalidInput, match="exactly one"):
-        plotting.contact_domains(closed)
+        plotting.plot(closed, "contact_domains")
     with pytest.raises(InvalidInput, match="exactly one"):
-        plotting.contact_domains(closed, shear=8e-3, normal_force=1e3)
+        plotting.plot(closed, "contact_domains", shear=8e-3, normal_force=1e3)
 
 
 def test_mask_without_coordinates():
     mask = xr.DataArray(np.eye(12, dtype=bool), dims=("y", "x"), name="state")
-    render(plotting.contact_domains(mask))
+    render(plotting.plot(mask, "contact_domains"))
 
 
 def speckled(cells, spot):
@@ -86,7 +86,7 @@ def speckled(cells, spot):
 
 
 def test_dots_are_magnified_where_the_most_contacts_are():
-    full, window = plotting.contact_domains(speckled(240, np.s_[100:110, 181:191]), zoom=40 * 8e-5)
+    full, window = plotting.plot(speckled(240, np.s_[100:110, 181:191]), "contact_domains", zoom=40 * 8e-5)
     image = colours(window)
     assert image.shape == (40, 40, 3)
     assert np.all(image == CONTACT, axis=-1).sum() >= 100  # the whole spot, and some of the cells
@@ -104,7 +104,7 @@ def test_dots_are_magnified_where_the_most_contacts_are():
 def test_titles_of_magnified_maps_stay_apart():
     force = ("step", 6.55 * 5.0 ** np.arange(6), {"units": "N"})
     paths = speckled(240, np.s_[100:101, 181:191]).isel(step=[0] * 6).assign_coords(normal_force=force)
-    axes = plotting.contact_domains(paths)
+    axes = plotting.plot(paths, "contact_domains")
     figure_of(axes).draw_without_rendering()
     width = axes[0].get_window_extent().width
     assert len(axes) == 8
@@ -114,6 +114,6 @@ def test_titles_of_magnified_maps_stay_apart():
 
 
 def test_only_maps_of_small_cells_are_magnified():
-    assert len(plotting.contact_domains(speckled(240, 0))) == 2
-    assert len(plotting.contact_domains(speckled(240, 0), zoom=0)) == 1
-    assert len(plotting.contact_domains(speckled(24, 0))) == 1
+    assert len(plotting.plot(speckled(240, 0), "contact_domains")) == 2
+    assert len(plotting.plot(speckled(240, 0), "contact_domains", zoom=0)) == 1
+    assert len(plotting.plot(speckled(24, 0), "contact_domains")) == 1

@@ -14,7 +14,7 @@ from fractalcontact.base.errors import InvalidInput
 
 def test_curves_are_those_of_the_result_and_named_by_their_shear(study):
     closure = study["joints/closure"].to_dataset()
-    numbers = plotting.curves(plotting.closure_laws(closure, units={"shear": "um", "normal_force": "N"}))
+    numbers = plotting.curves(plotting.plot(closure, "closure", units={"shear": "um", "normal_force": "N"}))
     assert set(numbers["y_axis"]) == {"normal force F (N)"}
     for row in range(closure.sizes["shear"]):
         name = f"interface closure, shear v = {1e6 * float(closure['shear'][row]):.4g} µm"
@@ -27,12 +27,12 @@ def test_curves_are_those_of_the_result_and_named_by_their_shear(study):
 def test_every_figure_names_its_curves(study):
     """Every line that shows data has a name; the others are marks, limits and scale bars."""
     figures = {
-        "contact_area": plotting.contact_area(study["joints/closure"]),
+        "contact_area": plotting.plot(study["joints/closure"], "contact_area"),
         "rigid_dilatancy": plotting.dilatancy(study["joints/rigid_dilatancy"]),
         "box_dimension": plotting.box_dimension(study["domains/box_dimension"]),
-        "hydraulic_aperture": plotting.hydraulic_aperture(study["joints/transmissivity"]),
+        "hydraulic_aperture": plotting.plot(study["joints/transmissivity"], "hydraulic_aperture"),
         "dimensions": plotting.dimensions(study["dimensions"]),
-        "dimension_curves": plotting.dimension_curves(study["dimensions"]),
+        "dimension_curves": plotting.plot(study["dimensions"], "dimension_curves"),
     }
     for name, axes in figures.items():
         numbers = plotting.curves(axes)
@@ -50,7 +50,7 @@ def test_panels_have_their_titles_and_rows_their_words(study):
         zip(estimates["method"].values.tolist(), estimates["fractal_dimension"].values, strict=True)
     )
     assert dict(zip(points["y"].str.replace(" ", "_"), points["x"], strict=True)) == pytest.approx(expected)
-    panels = plotting.curves(plotting.dimension_curves(study["dimensions"]))["panel"]
+    panels = plotting.curves(plotting.plot(study["dimensions"], "dimension_curves"))["panel"]
     assert set(panels) >= {name.replace("_", " ") for name in study["dimensions"].children}
 
 
@@ -84,7 +84,7 @@ def test_scans_are_sorted_with_intervals_and_outliers():
         {name: ("scan", values, {"units": "m"}) for name, values in columns.items()},
         {"scan": [f"{letter}.sur" for letter in "abcdefg"]},
     )
-    (ax,) = plotting.scans(overview, units={"rms_height": "um"})
+    (ax,) = plotting.plot(overview, "scans", units={"rms_height": "um"})
     assert ax.xaxis.get_units() == "µm"
     numbers = plotting.curves(ax).groupby("curve")["x"].apply(list)
     assert np.allclose(numbers["scan"], [1, 2, 2.5, 3, 4])

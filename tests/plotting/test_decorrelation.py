@@ -1,5 +1,7 @@
 """Correlation of the faces and dimension of the delta-surface."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -48,7 +50,7 @@ def test_correlation_and_length():
 
 def test_delta_dimension_curves():
     result = delta_dimensions()
-    ax = plotting.delta_dimension(result)
+    ax = plotting.plot(result, "delta_dimension")
     assert [list(line.get_ydata()) for line in ax.lines] == [list(result[name].values) for name in WAYS]
     assert ax.get_xscale() == "log"
 
@@ -56,7 +58,7 @@ def test_delta_dimension_curves():
 def test_labels_of_shears_stay_apart():
     result = delta_dimensions()
     shear = np.geomspace(3e-4, 6e-3, result.sizes["shear"])
-    ax = plotting.delta_dimension(result.assign_coords(shear=("shear", shear)))
+    ax = plotting.plot(result.assign_coords(shear=("shear", shear)), "delta_dimension")
     ax.figure.draw_without_rendering()
     labels = ax.get_xticklabels(which="both")
     boxes = [label.get_window_extent() for label in labels if label.get_text()]
@@ -67,7 +69,7 @@ def test_labels_of_shears_stay_apart():
 def test_nan_and_single_shear():
     for result, draw in (
         (decorrelation(), plotting.correlation),
-        (delta_dimensions(), plotting.delta_dimension),
+        (delta_dimensions(), partial(plotting.plot, kind="delta_dimension")),
     ):
         missing = result.assign({name: v * np.nan for name, v in result.data_vars.items()})
         draw(missing).figure.canvas.draw()
@@ -78,4 +80,4 @@ def test_wrong_result_is_refused():
     with pytest.raises(ValueError, match="correlation"):
         plotting.correlation(delta_dimensions())
     with pytest.raises(ValueError, match="covering_dimension"):
-        plotting.delta_dimension(decorrelation())
+        plotting.plot(decorrelation(), "delta_dimension")

@@ -16,7 +16,7 @@ def test_curve_window_and_slope():
     curves, estimates = synthetic.curves(), synthetic.estimates()
     estimates["hurst"][:] = 0.78
     estimates["fractal_dimension"][:] = 2.22
-    axes = plotting.dimension_curves(curves, estimates)
+    axes = plotting.plot(curves, "dimension_curves", estimates=estimates)
     upper, lower = axes
     for ax, below, (name, curve) in zip(upper, lower, curves.items(), strict=True):
         scale = next(iter(curve.dims))
@@ -41,7 +41,9 @@ def test_profile_panels_and_tick_labels():
     profile = fc.surfaces.fbm(200, 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
     names = ("spectrum", "variogram", "roughness_length", "variation", "cube_counts", "covering")
     curves = {name: getattr(fc.dimensions, name)(profile) for name in names}
-    figure = figure_of(plotting.dimension_curves(curves, fc.dimensions.estimate(profile, list(names))))
+    figure = figure_of(
+        plotting.plot(curves, "dimension_curves", estimates=fc.dimensions.estimate(profile, list(names)))
+    )
     titles = {ax.get_title(loc="left") for ax in figure.axes}
     assert titles >= {name.replace("_", " ") for name in names}
     figure.draw_without_rendering()
@@ -91,7 +93,7 @@ def test_slope_of_each_curve(name, hurst):
         },
         coords={"method": ["fit"]},
     )
-    (upper,), (lower,) = plotting.dimension_curves({"fit": curve}, estimates)
+    (upper,), (lower,) = plotting.plot({"fit": curve}, "dimension_curves", estimates=estimates)
     assert lower.lines[1].get_ydata() == pytest.approx(slope)
     assert f"slope {slope:.2f}" in upper.texts[0].get_text()
 

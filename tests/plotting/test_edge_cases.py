@@ -1,5 +1,7 @@
 """Single steps, single shears, NaN, empty and full domains, extreme sizes: a complete figure each time."""
 
+from functools import partial
+
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
@@ -26,9 +28,9 @@ SLOW = ("one step without the dim", "one shear")  # two cases in one: "one of ea
 )
 def test_parts_of_a_study(study, case):
     for path, drawing in (
-        ("joints/closure", plotting.closure_laws),
-        ("joints/closure", plotting.contact_area),
-        ("joints/transmissivity", plotting.hydraulic_aperture),
+        ("joints/closure", partial(plotting.plot, kind="closure")),
+        ("joints/closure", partial(plotting.plot, kind="contact_area")),
+        ("joints/transmissivity", partial(plotting.plot, kind="hydraulic_aperture")),
         ("domains/box_dimension", plotting.box_dimension),
         ("domains/lacunarity", plotting.lacunarity),
     ):
@@ -37,17 +39,19 @@ def test_parts_of_a_study(study, case):
 
 @pytest.mark.parametrize("case", [case for case in CASES if "one shear" in case or "one" not in case])
 def test_domain_maps_of_parts(study, case):
-    render(plotting.contact_domains(study["joints/closure"].to_dataset().isel(CASES[case]), shear=0.0))
+    render(
+        plotting.plot(study["joints/closure"].to_dataset().isel(CASES[case]), "contact_domains", shear=0.0)
+    )
 
 
 def test_all_nan(study):
     for path, drawing in (
-        ("joints/closure", plotting.closure_laws),
-        ("joints/closure", plotting.contact_area),
+        ("joints/closure", partial(plotting.plot, kind="closure")),
+        ("joints/closure", partial(plotting.plot, kind="contact_area")),
         ("joints/rigid_dilatancy", plotting.dilatancy),
         ("joints/elastic_dilatancy", plotting.dilatancy),
         ("joints/friction", plotting.friction),
-        ("joints/transmissivity", plotting.hydraulic_aperture),
+        ("joints/transmissivity", partial(plotting.plot, kind="hydraulic_aperture")),
         ("domains/box_dimension", plotting.box_dimension),
         ("domains/lacunarity", plotting.lacunarity),
         ("dimensions", plotting.dimensions),
@@ -61,14 +65,14 @@ def test_all_nan(study):
 def test_empty_domain():
     closed = synthetic.closure(synthetic.delta(synthetic.heights()))
     empty = closed.assign(state=closed.state * 0)
-    render(plotting.contact_domains(empty, shear=8e-3))
+    render(plotting.plot(empty, "contact_domains", shear=8e-3))
     render(plotting.islands(synthetic.islands(empty.state.isel(shear=0, step=0))))
 
 
 def test_full_domain():
     closed = synthetic.closure(synthetic.delta(synthetic.heights()))
     full = closed.assign(state=closed.state * 0 + 1)
-    render(plotting.contact_domains(full, normal_force=1e3))
+    render(plotting.plot(full, "contact_domains", normal_force=1e3))
     render(plotting.islands(synthetic.islands(full.state.isel(shear=0, step=0))))
 
 

@@ -25,7 +25,7 @@ def nested(loads=LOADS):
 
 def test_colour_is_the_load_of_first_contact():
     path = nested()
-    ax = plotting.first_contact(path, units={"nominal_pressure": "MPa"})
+    ax = plotting.plot(path, "first_contact", units={"nominal_pressure": "MPa"})
     bar = ax.figure.axes[1]
     assert bar.get_ylabel() == "nominal pressure of first contact (MPa)"
     assert bar.get_ylim() == pytest.approx((0.1, 10.0))
@@ -45,15 +45,15 @@ def test_first_contact_of_one_shear_and_without_a_load():
     path = nested()
     two = xr.concat([path, path.assign(state=path.state[::-1].assign_coords(step=path.step))], "shear")
     two = label(two.assign_coords(shear=[1e-4, 2e-4]))
-    ax = plotting.first_contact(two, shear=2e-4)
+    ax = plotting.plot(two, "first_contact", shear=2e-4)
     assert "0.2 mm" in ax.get_title(loc="left") or "200" in ax.get_title(loc="left")
     falling = colours(ax)[two.state.values[1, 0] > 0]
     assert len(np.unique(falling, axis=0)) == 1  # all of the largest set touches in the first step
-    plain = plotting.first_contact(path.drop_vars("nominal_pressure"))
+    plain = plotting.plot(path.drop_vars("nominal_pressure"), "first_contact")
     assert plain.figure.axes[1].get_ylabel() == "step of first contact"
-    render(plotting.first_contact(path.assign(state=path.state * 0)))
+    render(plotting.plot(path.assign(state=path.state * 0), "first_contact"))
     with pytest.raises(InvalidInput, match="'state'"):
-        plotting.first_contact(path.drop_vars("state"))
+        plotting.plot(path.drop_vars("state"), "first_contact")
 
 
 def test_lineage_and_the_coalescence_load():
@@ -86,7 +86,7 @@ def test_alluvial_bars_are_islands_and_ribbons_what_they_share():
     cells = np.array([[[mark == "#" for mark in row]] for row in rows])
     loads = {"normal_force": ("step", [1.0, 2.0, 4.0]), "step": [0, 1, 2]}
     mask = label(xr.DataArray(cells.astype(np.int8), loads, ("step", "y", "x"), name="state"))
-    ax = plotting.alluvial(fc.domains.lineage(mask))
+    ax = plotting.plot(fc.domains.lineage(mask), "alluvial")
     shapes = [path.vertices[:-1] for bars in ax.collections for path in bars.get_paths()]
     bars = [shape for shape in shapes if len(shape) == 4]
     heights = {place: [] for place in range(3)}
@@ -103,7 +103,9 @@ def test_alluvial_bars_are_islands_and_ribbons_what_they_share():
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "2", "4"]
     render(ax)
     many = np.broadcast_to(cells[2], (12, *cells[2].shape)).astype(np.int8)
-    ax = plotting.alluvial(fc.domains.lineage(xr.DataArray(many, dims=("step", "y", "x"), name="state")))
+    ax = plotting.plot(
+        fc.domains.lineage(xr.DataArray(many, dims=("step", "y", "x"), name="state")), "alluvial"
+    )
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["1", "3", "5", "7", "9", "11"]
 
 
@@ -114,11 +116,11 @@ def test_alluvial_of_one_shear_and_of_nothing(measured):
     mask = label(xr.DataArray(cells, coords, ("shear", "step", "y", "x"), name="state").astype(np.int8))
     table = fc.domains.lineage(mask)
     for shear, states in zip((1e-4, 2e-4), cells, strict=True):
-        ax = plotting.alluvial(table, shear=shear)
+        ax = plotting.plot(table, "alluvial", shear=shear)
         tops = [max(path.vertices[:, 1].max() for path in bars.get_paths()) for bars in ax.collections[:3]]
         assert tops == states.sum((1, 2)).tolist()
         assert (ax.get_xlabel(), ax.get_title(loc="left")[:3]) == ("step", "$v$")
-    empty = plotting.alluvial(fc.domains.lineage(mask * 0))
+    empty = plotting.plot(fc.domains.lineage(mask * 0), "alluvial")
     assert "no islands" in [text.get_text() for text in empty.texts]
     render(empty)
 

@@ -14,7 +14,7 @@ from fractalcontact.base.errors import InvalidInput
 def test_units_are_as_wanted_and_can_be_read(study):
     closed = study["joints/closure"].to_dataset()
     wanted = {"closure": "m", "normal_force": "kN", "shear": "um"}
-    ax, plain = plotting.closure_laws(closed, units=wanted), plotting.closure_laws(closed)
+    ax, plain = plotting.plot(closed, "closure", units=wanted), plotting.plot(closed, "closure")
     assert (ax.get_xlabel(), ax.xaxis.get_units()) == ("closure (m)", "m")
     assert (ax.get_ylabel(), ax.yaxis.get_units()) == ("normal force $F$ (kN)", "kN")
     assert ax.artists[0].get_title().get_text() == "shear $v$ (µm)"
@@ -24,13 +24,13 @@ def test_units_are_as_wanted_and_can_be_read(study):
 
 
 def test_chosen_prefix_can_be_read(study):
-    ax = plotting.closure_laws(study["joints/closure"])
+    ax = plotting.plot(study["joints/closure"], "closure")
     assert ax.xaxis.get_units() == "µm"
     assert ax.xaxis.get_units() in ax.get_xlabel()
 
 
 def test_units_of_the_load_can_be_read(study):
-    ax = plotting.hydraulic_aperture(study["joints/transmissivity"], units={"normal_force": "N"})
+    ax = plotting.plot(study["joints/transmissivity"], "hydraulic_aperture", units={"normal_force": "N"})
     assert (ax.get_xlabel(), ax.xaxis.get_units()) == ("normal force $F$ (N)", "N")
     loads, shears = plotting.box_dimension(study["domains/box_dimension"], units={"shear": "m"})
     assert loads.xaxis.get_units() in loads.get_xlabel()
@@ -92,7 +92,9 @@ def test_unit_of_a_stiffness_is_a_quotient(unit, largest):
 
 def test_percent_or_fraction(study):
     data = study["joints/closure"].to_dataset()
-    percent, fraction = (plotting.contact_area(data, units={"contact_fraction": unit}) for unit in "%1")
+    percent, fraction = (
+        plotting.plot(data, "contact_area", units={"contact_fraction": unit}) for unit in "%1"
+    )
     highest = [max(line.get_ydata().max() for line in ax.lines) for ax in (percent, fraction)]
     assert highest[0] == pytest.approx(100 * highest[1])
     assert fraction.get_ylabel() == "real / nominal contact area"
@@ -104,7 +106,7 @@ def test_percent_or_fraction(study):
 )
 def test_wrong_units_are_refused(study, units, named):
     with pytest.raises(InvalidInput, match=rf"units\['{named}'\]"):
-        plotting.closure_laws(study["joints/closure"], units=units, ax=Figure().add_subplot())
+        plotting.plot(study["joints/closure"], "closure", units=units, ax=Figure().add_subplot())
 
 
 @pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
@@ -121,7 +123,7 @@ def test_formats_of_files(study, tmp_path, suffix):
 def test_units_of_the_accuracy_figures():
     measured = plotting_synthetic.accuracy()["contact"].to_dataset()
     units = {"run_time": "us", "memory": "kB"}
-    time, memory = plotting.error_against_time(measured, units=units)[0]
+    time, memory = plotting.plot(measured, "error_against_time", units=units)[0]
     assert (time.get_xlabel(), time.xaxis.get_units()) == ("run time (µs)", "µs")
     assert (memory.get_xlabel(), memory.xaxis.get_units()) == ("peak memory (kB)", "kB")
     first = measured.isel(method=0).dropna("setting")
@@ -139,7 +141,7 @@ def test_units_of_all_figures_are_words_by_name(study, tmp_path, units):
     with pytest.raises(InvalidInput, match="units: expected a dict of variable and unit"):
         plotting.draw(tree, tmp_path, units=units)
     with pytest.raises(InvalidInput, match="units: expected a dict of variable and unit"):
-        plotting.closure_laws(tree["joints/closure"], units=units)
+        plotting.plot(tree["joints/closure"], "closure", units=units)
 
 
 def test_units_in_titles_and_names_of_curves():
@@ -154,5 +156,5 @@ def test_units_in_titles_and_names_of_curves():
     face = surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=1e-4, rng=1)
     law = {"nominal_pressure": 1e6, "wall_strength": 6e7, "residual_friction_angle": 30}
     curve = joints.shear_curve(face, [0, 1e-3, 5e-3], **law)
-    numbers = plotting.curves(plotting.shear_curve(curve, units={"nominal_pressure": "kPa"}))
+    numbers = plotting.curves(plotting.plot(curve, "shear_curve", units={"nominal_pressure": "kPa"}))
     assert numbers["curve"].str.endswith("normal stress = 1000 kPa").all()

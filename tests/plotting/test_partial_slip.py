@@ -24,7 +24,7 @@ def sheared():
 
 def test_each_state_has_its_colour(sheared):
     step = sheared.isel(step=2)
-    image = colours(plotting.contact_domains(step)[0]).reshape(-1, 3)
+    image = colours(plotting.plot(step, "contact_domains")[0]).reshape(-1, 3)
     flags = step["slip_state"].values.ravel()
     shown = [np.unique(image[flags == flag], axis=0) for flag in (0, 1, 2)]
     assert [len(colour) for colour in shown] == [1, 1, 1]
@@ -34,7 +34,7 @@ def test_each_state_has_its_colour(sheared):
 
 
 def test_titles_and_legend(sheared):
-    figure = figure_of(plotting.contact_domains(sheared))
+    figure = figure_of(plotting.plot(sheared, "contact_domains"))
     titles = [ax.get_title(loc="left") for ax in figure.axes][:5]
     share = 100 * float(sheared["stick_area"][1] / sheared["contact_area"])
     assert "0 N" in titles[0]
@@ -47,14 +47,14 @@ def test_titles_and_legend(sheared):
 
 
 def test_fewer_panels_and_no_contact(sheared):
-    assert sum(ax.axison for ax in plotting.contact_domains(sheared, panels=3)) == 3
+    assert sum(ax.axison for ax in plotting.plot(sheared, "contact_domains", panels=3)) == 3
     empty = sheared.isel(step=[0]).copy()
     empty["slip_state"] = empty["slip_state"] * 0
-    assert "no contact" in plotting.contact_domains(empty)[0].get_title(loc="left")
+    assert "no contact" in plotting.plot(empty, "contact_domains")[0].get_title(loc="left")
 
 
 def test_loops_are_the_values_of_the_result(sheared):
-    left, right = plotting.slip_loops(sheared)
+    left, right = plotting.plot(sheared, "slip_loops")
     x, y = left.lines[0].get_data()
     np.testing.assert_allclose(y, sheared["tangential_force"])
     assert left.get_xlabel() == "tangential displacement (µm)"
@@ -67,7 +67,7 @@ def test_loops_of_a_joint():
     face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=2e-6, rng=1)
     crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=2.4e-3)
     pushed = fc.joints.partial_slip(crack, shear=[1e-4, 3e-4], normal_force=50, tangential_force=[0, 20, -20])
-    figure = figure_of(plotting.slip_loops(pushed))
+    figure = figure_of(plotting.plot(pushed, "slip_loops"))
     left, right = figure.axes
     assert len(left.lines) == len(right.lines) == 2
     np.testing.assert_allclose(left.lines[1].get_xdata(), 1e6 * pushed["tangential_displacement"][1])
@@ -76,8 +76,8 @@ def test_loops_of_a_joint():
 
 def test_bad_input(sheared):
     with pytest.raises(InvalidInput, match="stick_area"):
-        plotting.slip_loops(sheared.drop_vars("stick_area"))
+        plotting.plot(sheared.drop_vars("stick_area"), "slip_loops")
     with pytest.raises(InvalidInput, match="'state'"):
-        plotting.contact_domains(sheared.drop_vars("slip_state"))
+        plotting.plot(sheared.drop_vars("slip_state"), "contact_domains")
     with pytest.raises(InvalidInput, match="panels"):
-        plotting.contact_domains(sheared, panels=0)
+        plotting.plot(sheared, "contact_domains", panels=0)

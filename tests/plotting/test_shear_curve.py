@@ -28,7 +28,7 @@ def criterion(face):
 
 
 def test_curves_are_the_values(test_result):
-    figure = figure_of(plotting.shear_curve(test_result))
+    figure = figure_of(plotting.plot(test_result, "shear_curve"))
     for ax, name in zip(figure.axes, ("shear_stress", "dilatancy"), strict=True):
         for i in range(2):
             one = test_result.isel(nominal_pressure=i)
@@ -37,7 +37,7 @@ def test_curves_are_the_values(test_result):
 
 
 def test_a_criterion_beside_a_test_shares_colours_and_units(test_result, criterion):
-    figure = figure_of(plotting.shear_curve(test_result, beside=criterion))
+    figure = figure_of(plotting.plot(test_result, "shear_curve", beside=criterion))
     stress = figure.axes[0]
     dashed = [line for line in stress.lines if line.get_linestyle() == "--"]
     assert len(dashed) == 2
@@ -53,7 +53,7 @@ def test_an_unknown_normal_stress_has_its_own_colour(test_result, criterion):
     unknown = test_result.assign_coords(nominal_pressure=[2e6, np.nan])
     unknown.nominal_pressure.attrs = test_result.nominal_pressure.attrs
     for result in (unknown, unknown.isel(nominal_pressure=[1]), unknown.isel(nominal_pressure=[1, 1])):
-        stress = figure_of(plotting.shear_curve(result, beside=criterion)).axes[0]
+        stress = figure_of(plotting.plot(result, "shear_curve", beside=criterion)).axes[0]
         assert len(stress.lines) == result.sizes["nominal_pressure"] + 2
         for i in range(result.sizes["nominal_pressure"]):
             one = result.isel(nominal_pressure=i)
@@ -61,7 +61,9 @@ def test_an_unknown_normal_stress_has_its_own_colour(test_result, criterion):
         assert (
             stress.lines[result.sizes["nominal_pressure"] - 1].get_label().endswith("normal stress = - MPa")
         )
-    first, second, beside, _ = figure_of(plotting.shear_curve(unknown, beside=criterion)).axes[0].lines
+    first, second, beside, _ = (
+        figure_of(plotting.plot(unknown, "shear_curve", beside=criterion)).axes[0].lines
+    )
     assert first.get_color() == beside.get_color() != second.get_color()
 
 

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from calls import CALLS
+from calls import CALLS, figure_name, function_of
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
@@ -16,13 +16,15 @@ from plotting_figures import figure_of
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.plotting._draw import KINDS
 
-FIGURES = [name for name in plotting.__all__ if name not in ("draw", "curves")]
+FIGURES = list(KINDS)
 
 
 def draw(name, **options):
-    """Draw a figure of what `CALLS` has for it."""
-    return getattr(plotting, name)(**CALLS[f"plotting.{name}"](), **options)
+    """Draw a kind of figure of what `CALLS` has for it."""
+    name = figure_name(name)
+    return function_of(name)(**CALLS[name](), **options)
 
 
 def panels(drawn):
@@ -31,7 +33,7 @@ def panels(drawn):
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_takes_axes(name):
-    parameters = inspect.signature(getattr(plotting, name)).parameters
+    parameters = inspect.signature(KINDS[name][0]).parameters
     assert len({"ax", "axes"} & set(parameters)) == 1
 
 
@@ -48,7 +50,7 @@ def test_axes_are_returned_and_readable_in_a_dark_style(name):
     sheet = Figure(figsize=(12, 12))
     axes = sheet.subplots(4, 3, subplot_kw={"projection": "polar" if is_polar else None}).ravel()
     axes = axes[: panels(drawn).size]
-    is_single = "ax" in inspect.signature(getattr(plotting, name)).parameters
+    is_single = "ax" in inspect.signature(KINDS[name][0]).parameters
     again = draw(name, **({"ax": axes[0]} if is_single else {"axes": axes}))
     assert np.array_equal(panels(again), axes)
     assert plt.get_fignums() == []
@@ -101,7 +103,7 @@ def _require_readable(figure):
 @pytest.mark.parametrize("size", [9.0, 16.0])
 def test_size_of_text_is_that_of_the_style(study, size):
     with plt.style.context(["default", {"font.size": size}]):
-        ax = plotting.closure_laws(study["joints/closure"])
+        ax = plotting.plot(study["joints/closure"], "closure")
         assert ax.xaxis.label.get_size() == size
         assert ax.get_xticklabels()[0].get_size() == size
         assert ax.title.get_size() == pytest.approx(1.2 * size)
@@ -112,7 +114,7 @@ def test_size_of_text_is_that_of_the_style(study, size):
 def test_logarithmic_axes_have_small_ticks_at_two_and_five():
     lag = np.geomspace(1e-4, 1.0, 9)  # m: four decades; of the variogram nine
     curve = xr.Dataset({"variogram": ("lag", 1e-3 * lag**2.25)}, {"lag": lag})
-    upper = plotting.dimension_curves(curve)[0, 0]
+    upper = plotting.plot(curve, "dimension_curves")[0, 0]
     for axis in (upper.xaxis, upper.yaxis):
         ticks = np.log10(axis.get_minorticklocs())
         assert set(np.round(10 ** (ticks - np.floor(ticks + 1e-9)), 6)) == {2.0, 5.0}

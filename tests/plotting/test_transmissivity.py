@@ -14,7 +14,7 @@ def closed():
 
 def test_curve_per_flow_direction(closed):
     result = synthetic.transmissivity(closed)
-    ax = plotting.hydraulic_aperture(result)
+    ax = plotting.plot(result, "hydraulic_aperture")
     for v in result.shear:
         for word in "xy":
             expected = result.sel(shear=v, axis=word)

@@ -19,13 +19,13 @@ pressure = MODULUS * np.geomspace(5e-4, 0.1, 14)
 pressed = fc.contact.press(surface, contact_modulus=MODULUS, nominal_pressure=pressure)
 print(pressed)
 
-maps = fc.plotting.contact_domains(pressed.isel(step=[0, 3, 6, 8, 10, 13]))
+maps = fc.plotting.plot(pressed.isel(step=[0, 3, 6, 8, 10, 13]), "contact_domains")
 
 # %%
 # The whole evolution in one map: without plasticity the sets are nested, so that the domain at a load is all
 # that has its colour or a darker one.
 
-first = fc.plotting.first_contact(pressed)
+first = fc.plotting.plot(pressed, "first_contact")
 
 # %%
 # Islands are born until those that merge outnumber them. The dotted line is the load of coalescence.
@@ -38,7 +38,7 @@ counts = fc.plotting.evolution(evolution)
 # Which islands grow together: each of the 20 largest islands of the last load has a colour, and so have all
 # that it grew from.
 
-tree = fc.plotting.alluvial(fc.domains.lineage(pressed.isel(step=slice(0, 9))["state"]))
+tree = fc.plotting.plot(fc.domains.lineage(pressed.isel(step=slice(0, 9))["state"]))
 
 # %%
 # The local dimension d(s) of all states over one axis in metres. Below the spot size (circle) a domain is a
@@ -65,4 +65,4 @@ lacunarity_map = fc.plotting.lacunarity(lacunarity, maps=True)
 # %%
 # The real contact area is proportional to the pressure at first and saturates in the end.
 
-area = fc.plotting.contact_area(pressed, against="nominal_pressure")
+area = fc.plotting.plot(pressed, "contact_area", against="nominal_pressure")

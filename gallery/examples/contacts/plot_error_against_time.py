@@ -18,4 +18,4 @@ print(measured)
 # The function also draws the other benchmarks of this group, with rough surfaces.
 
 sphere = measured.isel(method=measured["benchmark"] == "sphere")
-figure = fc.plotting.error_against_time(sphere)
+figure = fc.plotting.plot(sphere)

@@ -28,7 +28,7 @@ sheared = fc.contact.partial_slip(
 )
 print(sheared)
 
-maps = fc.plotting.contact_domains(sheared.isel(step=[0, 3, 6, 9, 15, 27]))
+maps = fc.plotting.plot(sheared.isel(step=[0, 3, 6, 9, 15, 27]), "contact_domains")
 
 # %%
 # The loop between force and displacement encloses the energy that friction dissipates in one cycle. The

@@ -34,7 +34,7 @@ unloaded = fc.contact.press(
 )
 print(sheared["full"])
 
-maps = fc.plotting.contact_domains(sheared["full"])
+maps = fc.plotting.plot(sheared["full"], "contact_domains")
 
 # %%
 # The stick set of the superposition and the contact under the smaller force agree node by node. With the

@@ -25,7 +25,7 @@ curve = fc.joints.shear_curve(
     wall_strength=STRENGTH,
     residual_friction_angle=FRICTION,
 )
-curves = fc.plotting.shear_curve(test, beside=curve)
+curves = fc.plotting.plot(test, beside=curve)
 
 # %%
 # The peak strengths among the empirical criteria, which see the face as a JRC or as an angle of its
@@ -50,4 +50,4 @@ strengths = fc.plotting.strength_envelope(envelope, tests=test)
 cycles = fc.joints.direct_shear(
     crack, [3e-3, -3e-3, 3e-3, -3e-3], nominal_pressure=PRESSURES[1], hardness=STRENGTH
 )
-loops = fc.plotting.shear_curve(cycles)
+loops = fc.plotting.plot(cycles)

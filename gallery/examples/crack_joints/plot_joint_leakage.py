@@ -18,7 +18,7 @@ closure = fc.joints.closure(
     crack, shear=[2e-4, 8e-4, 3.2e-3], direction="E", normal_force=[100, 300, 1e3, 3e3, 1e4], keep=["gap"]
 )
 print(closure)
-laws = fc.plotting.closure_laws(closure)
+laws = fc.plotting.plot(closure)
 
 # %%
 # The rise of the block when it slides without normal force, in four directions.
@@ -32,4 +32,4 @@ dilatancy = fc.plotting.dilatancy(opening)
 
 flow = fc.joints.transmissivity(closure["gap"])
 print(flow)
-aperture = fc.plotting.hydraulic_aperture(flow)
+aperture = fc.plotting.plot(flow)

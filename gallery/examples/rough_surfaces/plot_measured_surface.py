@@ -34,7 +34,7 @@ curves = {
 }
 estimates = fc.dimensions.estimate(surface, ["default", *curves])
 print(estimates)
-scaling = fc.plotting.dimension_curves(curves, estimates)
+scaling = fc.plotting.plot(curves, estimates=estimates)
 
 # %%
 # The dimensions with their intervals. They need not agree: the methods use different windows of scales,

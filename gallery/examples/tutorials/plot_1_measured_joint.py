@@ -58,8 +58,8 @@ closure = fc.joints.closure(crack, shear=0.0, nominal_pressure=[1e5, 3e5, 1e6, 3
 flow = fc.joints.transmissivity(closure.gap)
 print(crack)
 print(flow.hydraulic_aperture)
-laws = fc.plotting.closure_laws(closure)
-opening = fc.plotting.hydraulic_aperture(flow)
+laws = fc.plotting.plot(closure)
+opening = fc.plotting.plot(flow)
 
 # %%
 # The same files as a scene. ``datasheet = true`` adds what a datasheet shows: roughness, strength,

@@ -34,7 +34,7 @@ print(pressed)
 # Counting cells overestimates the area by the cells at the edge of the contacts; the corrected area
 # (Yastrebov, Anciaux and Molinari 2017) takes half of them off.
 
-area = fc.plotting.contact_area(pressed, against="nominal_pressure", theory=theories, log=True)
+area = fc.plotting.plot(pressed, "contact_area", against="nominal_pressure", theory=theories, log=True)
 
 # %%
 # Contact fraction over pressure / (modulus x rms slope). Persson's theory starts at :math:`\sqrt{8/\pi} =

@@ -14,7 +14,7 @@ surface = fc.surfaces.spectral((256, 256), 1e-4, hurst=0.8, rms_slope=0.1, rollo
 modulus = 2e10
 pressed = fc.contact.press(surface, contact_modulus=modulus, nominal_pressure=[5e6, 2e7, 8e7, 3e8])
 print(pressed)
-maps = fc.plotting.contact_domains(pressed)
+maps = fc.plotting.plot(pressed, "contact_domains")
 
 # %%
 # The null is a set of as many cells, placed at random. A dimension that differs from it by more than its

@@ -56,7 +56,7 @@ low, high = float(pooled.fractal_dimension_low), float(pooled.fractal_dimension_
 print(f"D {pooled.fractal_dimension:.3f}, 95 % interval {low:.3f} to {high:.3f}; truth {3 - HURST:.3f}")
 print(f"scatter between scans {pooled.between_scans:.3f}, error within {pooled.within_scans:.3f}")
 assert low < 3 - HURST < high
-axes = fc.plotting.scans(result["overview"])
+axes = fc.plotting.plot(result["overview"])
 
 # %%
 # The two measured faces of one fracture, where they are there (see :doc:`/measured_surfaces`), have one
