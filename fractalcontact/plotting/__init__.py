@@ -5,7 +5,7 @@ Every function takes a result of another subpackage, as computed or as read back
     ax = fc.plotting.plot(result)
     ax.figure.savefig("closure.png")  # or .svg, .pdf
 
-`plot` draws the standard figure of any result, and other kinds by name; `path` any variable of a path of load
+`plot` draws the standard figure of a result, and other kinds by name; `path` any variable of a path of load
 or shear, `field` any map.
 
 A function with one panel returns its Axes, one with several an array of Axes; `ax=` or `axes=` draws into a

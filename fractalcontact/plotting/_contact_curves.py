@@ -146,7 +146,8 @@ def _own_variables(result: Any) -> list[str]:
     is_one = isinstance(result, xr.DataArray) and result.name is not None
     names = [str(result.name)] if is_one else str(result.attrs.get("path_figure", "")).split()
     with Problems("fc.plotting") as problems:
-        problems.require(bool(names), "variable", f"one of {list(result)}, for there is no standard", NONE)
+        known = ", ".join(map(str, getattr(result, "data_vars", ())))
+        problems.require(bool(names), "variable", f"one of {known}: the result has no standard figure", NONE)
     return names
 
 

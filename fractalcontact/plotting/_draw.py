@@ -65,7 +65,7 @@ KINDS: dict[str, tuple[Drawing, tuple[str, ...]]] = {
     "hydraulic_aperture": (_closure.hydraulic_aperture, ("hydraulic_aperture",)),
     "slip_loops": (_contact_curves.slip_loops, ("stick_area",)),
     "dilatancy": (_strength.dilatancy, ("dilatancy", "rigid_dilatancy")),
-    "closure": (_closure.closure_laws, ("contact_fraction",)),
+    "closure": (_closure.closure_laws, ("corrected_contact_fraction",)),
     "contact_area": (_contact_curves.contact_area, ()),
     "contact_domains": (_fields.contact_domains, ("state", "slip_state")),
     "first_contact": (_fields.first_contact, ()),
@@ -73,11 +73,11 @@ KINDS: dict[str, tuple[Drawing, tuple[str, ...]]] = {
     "alluvial": (_islands.alluvial, ("common_cells",)),
     "evolution": (_islands.evolution, ("births",)),
     "islands": (_islands.islands, ("area",)),
-    "lacunarity": (_size_curves.lacunarity, ("lacunarity",)),
+    "lacunarity": (_size_curves.lacunarity, ("null_lacunarity",)),
     "box_dimension": (_size_curves.box_dimension, _size_curves.DIMENSIONS),
     "signature": (_size_curves.signature, ("spot_size", "box_count")),
     "scaling": (_dimensions.scaling, ("window_hurst",)),
-    "dimensions": (_dimensions.dimensions, ("fractal_dimension",)),
+    "dimensions": (_dimensions.dimensions, ("window_rule",)),
     **OF_SEVERAL,
     "surface": (_fields.surface, ("height",)),
     "field": (_fields.field, ()),
@@ -86,15 +86,16 @@ KINDS: dict[str, tuple[Drawing, tuple[str, ...]]] = {
 
 
 def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
-    """Draw the standard figure of a result of any function, or another kind of figure of it.
+    """Draw the standard figure of a result, found by its variables, or another kind of figure of it.
 
     Parameters
     ----------
     result : Dataset, DataArray, or node of a DataTree
-        From any function of fractalcontact, as computed or as read back from a file.
+        Of fractalcontact, as computed or as read back from a file; also a mapping of scaling curves by name.
     kind : str, optional
-        Default: the standard figure of the result. One that has no other is drawn along its path of load or
-        shear; a map of a field in colours. The kinds, with their options and where they are the standard:
+        Default: the standard figure of the result. A DataArray without one is drawn as a map, or along its
+        path of load or shear; numbers alone have none. The kinds, with their options and the functions whose
+        results have them as the standard:
 
         - closure (`laws`, `shear`, `marked`, `key`, `log`): normal force against total (thin) and interface
           closure; with `laws` of `joints.closure_laws` these through its steps. `contact.press`,
@@ -118,7 +119,12 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
 
         Figures with a function of their own, such as `dilatancy`, are kinds too.
     **options
-        `units` by name of a variable, `ax` or `axes` to draw into, and those of the kind.
+        `units` by name of a variable, `ax` or `axes` to draw into, and those of the kind. `shear` (m) and
+        `normal_force` (N) choose the nearest state; `against` is normal_force, nominal_pressure or closure;
+        `marked` are steps to mark A, B, C ... at that shear; `key` (bool) is the legend of the shears; `log`
+        (bool) shows every decade, of contact_area with a line proportional to the load; `panels` is the
+        largest number of maps; `zoom` is 0 for no window, and None for one where cells are hard to see;
+        `theory` is from `contact.theories`, `beside` another shear curve or test.
 
     Returns
     -------
@@ -128,7 +134,8 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
     Raises
     ------
     InvalidInput
-        The result has no such figure, or an option is not one of the kind.
+        The result has no such figure, or several that are to be chosen with `.sel` or `.isel`, or an option
+        is not one of the kind.
 
     Examples
     --------

@@ -93,13 +93,13 @@ def require_variables(dataset: xr.Dataset, names: Sequence[str], argument: str =
             )
 
 
-def require_dims(dataset: xr.Dataset, dims: Mapping[str, str], argument: str = "result") -> None:
+def require_dims(dataset: xr.Dataset, dims: Mapping[str, str]) -> None:
     """Raise InvalidInput unless each of the variables has its dim."""
     with Problems("fc.plotting") as problems:
         for name, dim in dims.items():
-            if problems.require(name in dataset.variables, argument, f"the variable {name!r}", NONE):
+            if problems.require(name in dataset.variables, "result", f"the variable {name!r}", NONE):
                 own = dataset[name].dims
-                problems.require(dim in own, f"{argument}.{name}", f"the dim {dim}", own)
+                problems.require(dim in own, f"result.{name}", f"the dim {dim}", own)
 
 
 def require_known_dims(dataset: xr.Dataset, dims: Mapping[str, Sequence[str]]) -> None:

@@ -26,7 +26,6 @@ from fractalcontact.base.resources import DRAWING_LOCK, most_workers
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
-from fractalcontact.scenes._datasheet import datasheet
 from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
 from fractalcontact.scenes._export import tables
 from fractalcontact.scenes._html_report import page_contents, pictures_of, write_report
@@ -38,7 +37,7 @@ from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._scene_file import scans_of
 from fractalcontact.scenes._stages import FIGURES, check_memory, stages_of
 from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
-from fractalcontact.scenes._summary import Summary, screen_text, summary_of, verbose_text
+from fractalcontact.scenes._summary import Summary, datasheet, screen_text, summary_of, verbose_text
 from fractalcontact.scenes._validation import implausible_result, validated, warn_of
 
 

@@ -3,7 +3,7 @@
 import inspect
 
 import pytest
-from calls import CALLS, closed, figure_name, pressed
+from calls import CALLS, closed, figure_name, pressed, result_of
 from plotting_figures import figure_of
 
 import fractalcontact as fc
@@ -79,5 +79,7 @@ def test_wrong_calls_are_refused(study):
         plotting.plot(3.0)
     with pytest.raises(InvalidInput, match="`draw` draws a study"):
         plotting.plot(study)
-    with pytest.raises(InvalidInput, match="variable"):
+    with pytest.raises(InvalidInput, match="variable: expected one of residual: the result has no standard"):
         plotting.plot(pressed()[["residual"]])
+    with pytest.raises(InvalidInput, match="no standard figure"):
+        plotting.plot(result_of("contact.theories"))
