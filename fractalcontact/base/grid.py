@@ -24,6 +24,7 @@ from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, Quantity
 # its increment
 UNIFORM = 1e-6
 DECADES = 100  # squares and cubes of lengths between 1e-100 and 1e100 m can be represented
+_LENGTHS = f"1e-{DECADES} to 1e{DECADES} m"
 # share of a cell by which each edge of `contact_edges` makes the counted area too large (Yastrebov, Anciaux
 # and Molinari 2017)
 EXCESS_PER_EDGE = (math.pi - 1.0 + math.log(2.0)) / 24.0
@@ -170,8 +171,8 @@ def axis_faults(array: xr.DataArray | xr.Dataset, dim: str, name: str) -> Iterat
     spacing = (float(centres[-1]) - float(centres[0])) / (n - 1)
     if not 0 < spacing < np.inf:
         yield name, "finite, ascending cell centres", f"{centres[0]:g} ... {centres[-1]:g}"
-    elif not _within(spacing, DECADES):
-        yield name, f"a spacing of {_decades(DECADES)}", f"{spacing:g}"
+    elif not _within(spacing):
+        yield name, f"a spacing of {_LENGTHS}", f"{spacing:g}"
     else:
         distance = np.abs(centres - (centres[0] + spacing * np.arange(n))).max()
         if not distance <= UNIFORM * spacing + 4.0 * np.spacing(np.abs(centres).max()):
@@ -186,7 +187,7 @@ def _units_faults(attributes: Mapping[Any, Any], name: str) -> Iterator[Fault]:
 
 def is_length(value: Any) -> bool:
     """Return whether an attribute is one positive length in metres that float64 holds."""
-    return is_real(value) and _within(value, DECADES)
+    return is_real(value) and _within(value)
 
 
 def surface_faults(
@@ -197,7 +198,6 @@ def surface_faults(
     smallest: int = 3,
     leading: bool = False,
     profile: bool = False,
-    decades: int = DECADES,
 ) -> Iterator[Fault]:
     """Yield what keeps an array from being a surface, heights in metres on a uniform grid.
 
@@ -215,8 +215,6 @@ def surface_faults(
         Allow dims before (y, x).
     profile : bool
         Allow a profile, dims (..., x) without y.
-    decades : int
-        Allowed powers of ten of a metre, up and down, for heights and their range.
     """
     if not isinstance(surface, xr.DataArray):
         expected = "a DataArray of heights (see fractalcontact.surfaces.from_array)"
@@ -237,7 +235,7 @@ def surface_faults(
             yield from missing_faults(surface.values, argument)
         in_memory = not has_blocks(surface)
         if in_memory:
-            yield from _size_faults(surface.values, argument, decades)
+            yield from _size_faults(surface.values, argument)
         if in_memory and not finite and np.isinf(distinct(surface.values)).any():
             yield argument, "heights that are finite or NaN", "infinite heights"
     if surface.dims[-len(dims) :] == dims:
@@ -265,7 +263,7 @@ def missing_faults(
         yield argument, expected, f"{missing} of {values.size} NaN or infinite"
 
 
-def _size_faults(heights: Array, argument: str, decades: int) -> Iterator[Fault]:
+def _size_faults(heights: Array, argument: str) -> Iterator[Fault]:
     """Yield finite heights, or a range of them, whose powers float64 cannot represent."""
     if heights.size == 0:
         return
@@ -276,18 +274,14 @@ def _size_faults(heights: Array, argument: str, decades: int) -> Iterator[Fault]
         low, high = (float(observed.min()), float(observed.max())) if observed.size else (0.0, 0.0)
     largest = max(abs(low), abs(high))
     for size, quantity in ((largest, "heights"), (high / 2.0 - low / 2.0, "a range of heights")):
-        if size and not _within(size, decades):
-            yield argument, f"{quantity} of 0 or of {_decades(decades)}", f"{size:g} m"
+        if size and not _within(size):
+            yield argument, f"{quantity} of 0 or of {_LENGTHS}", f"{size:g} m"
             return
 
 
-def _within(length: float, decades: int) -> bool:
+def _within(length: float) -> bool:
     rounded = 1.0 + UNIFORM  # a spacing is computed from centres
-    return 10.0**-decades <= length * rounded and length <= rounded * 10.0**decades
-
-
-def _decades(decades: int) -> str:
-    return f"1e-{decades} to 1e{decades} m"
+    return length * rounded >= 10.0**-DECADES and length <= rounded * 10.0**DECADES
 
 
 def result_faults(data: Any, argument: str) -> Iterator[Fault]:

@@ -46,6 +46,7 @@ from fractalcontact.dimensions._surface_input import Scales, between, middle_sli
 Array = np.ndarray[Any, np.dtype[Any]]
 
 LARGEST = 2048  # points along each axis: 5 s of processor time and .8 GB
+LARGEST_SPACINGS = 32.0  # ratio of the spacings: images are summed as far along both axes
 SECTORS = 16  # of the half-circle
 # cos^16 of the angle to an azimuth weights the modes, as many as a sector of 25 degrees either side. Of
 # exponents .4 and .8 that were built in it finds .90 and .45; cos^8 .85 and .79, cos^24 .92 and .29
@@ -148,7 +149,7 @@ def _shortest(modes: PlaneModes, power: Array) -> float:
     """Return the shortest wavelength before a cut-off, beyond which there is only leakage; 0 without one."""
     q = np.hypot(modes.y, modes.x)[modes.half]
     ring = np.unique(_rings(np.log(q)), return_inverse=True)[1]
-    density = power[modes.half] / modes.filtered(1.0, modes.y, modes.x)[modes.half]
+    density = power[modes.half] / np.maximum(modes.filtered(1.0, modes.y, modes.x)[modes.half], 1e-300)
     mean = np.bincount(ring, density) / np.bincount(ring)
     falls = np.flatnonzero(mean[PER_OCTAVE:] < _CUT_OFF * mean[:-PER_OCTAVE])
     return 2.0 * np.pi / float(q[ring < falls[0] + PER_OCTAVE - 1].max()) if falls.size else 0.0
@@ -399,12 +400,14 @@ def fit_azimuths(
 ) -> AzimuthFit | None:
     """Fit the waves of a surface, or of its middle, by azimuth.
 
-    None if they are too few, or if their lengths differ by less than `least_log_ratio`. `scales`: wavelengths
-    that count, in x spacings.
+    None if they are too few, if their lengths differ by less than `least_log_ratio`, or the spacings by more
+    than `LARGEST_SPACINGS`. `scales`: wavelengths that count, in x spacings.
     """
     middle = middle_slices(first.heights.shape, LARGEST)
     observed, heights = np.isfinite(first.heights[middle]), first.filled[middle]
     dy = first.lattice.spacing[0]
+    if max(dy, 1.0 / dy) > LARGEST_SPACINGS:
+        return None
     is_periodic = first.lattice.periodic and heights.shape == first.heights.shape
     modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_periodic)
     power = modes.power(heights)

@@ -10,10 +10,18 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_directions, read_directions
+from fractalcontact.base.grid import read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._azimuths import IMPROBABLE, LARGEST, NO_METRIC, AzimuthFit, fit_azimuths
+from fractalcontact.dimensions._azimuths import (
+    IMPROBABLE,
+    LARGEST,
+    LARGEST_SPACINGS,
+    NO_METRIC,
+    AzimuthFit,
+    fit_azimuths,
+)
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
 from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, squared_length
@@ -61,6 +69,10 @@ def _check(problems: Problems) -> None:
     if problems.given.direction is not None:
         check_directions(problems)
     is_valid = check_surface(problems, smallest=SMALLEST, profile=False, reserved=_NAMES)
+    if is_valid:
+        spacing, most = read_grid(problems.given.surface).spacing, LARGEST_SPACINGS
+        ratio = max(spacing) / min(spacing)
+        problems.require(ratio <= most, "surface", f"spacings within {most:.0f} to 1", f"{ratio:.3g} to 1")
     check_scales(problems, is_valid=is_valid)
 
 
@@ -101,7 +113,7 @@ def directions(
     Raises
     ------
     InvalidInput
-        A profile, wrong axes or scales, a surface too small or entirely NaN.
+        A profile, wrong axes or scales, a surface too small or entirely NaN, spacings beyond 32 to 1.
 
     Notes
     -----
@@ -285,7 +297,7 @@ def _along(fit: AzimuthFit, azimuth: float, along: Array, every: Array, unit: fl
     share, u, scale = (values[is_probable] for values in (found.share, found.centre, found.scale))
     slope = span * np.exp(-0.5 * u * u) / np.sqrt(2.0 * np.pi)
     centre = LOWEST + span * ndtr(u) + along[1] - every[1]
-    deviation = np.sqrt(np.maximum(np.square(scale * slope) - every[2], 0.0) + along[2])
+    deviation = np.sqrt(np.maximum(np.square(scale * slope) - every[2], 1e-16) + along[2])
     places = np.linspace((centre - 5.0 * deviation).min(), (centre + 5.0 * deviation).max(), 2001)
     below = share @ ndtr((places - centre[:, None]) / deviation[:, None]) / share.sum()
     low, hurst, high = np.interp((0.025, 0.5, 0.975), below, places).tolist()

@@ -5,7 +5,7 @@ an isotropic surface, else one that shortens the lags along the longer correlati
 
     S(q) = c(H) (q' M^-1 q)^(-1 - H),    c(H) = 2^(2 H + 1) pi H Gamma(1 + H) / Gamma(1 - H),
 
-and that of its samples the sum over the images q + 2 pi k. The nearest nine are summed; the rest, a smooth
+and that of its samples the sum over the images q + 2 pi k. The nearest are summed; the rest, a smooth
 function of q, is interpolated.
 """
 
@@ -25,10 +25,14 @@ from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, LONG_HU
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-_NODES, _IMAGES = 8, 4  # of the interpolation, and images summed each way: density of a ratio of 8 to .3 %
-# t times the ratio of the metric from which on a sum over lags is used: both are exact to 1e-5
+# of the interpolation, and images each way over those summed one by one: density of a ratio of 4 to .1 %, of
+# 8 to 2 %
+_NODES, _IMAGES = 8, 4
+# t in squares of the longer spacing, times the ratio of the metric, from which on a sum over lags is used:
+# both sums are exact to 1e-5
 _NARROW = 1.85
 _REACH = 2.6  # longest of these lags over the ratio
+_LAGS = 1 << 12  # at a time
 LARGEST_LOG_RATIO = math.log(16.0)  # of a metric that is fitted: lags in the tables grow with its square
 
 
@@ -75,9 +79,9 @@ class MetricSpectrum:
         hurst, spread = float(self.theta[HURST]), float(self.theta[SPREAD])
         inverse = np.linalg.inv(self.metric)
         total = np.zeros(np.broadcast(y, x).shape)
-        near = (0,) if self.form == UNALIASED else (-1, 0, 1)
-        for down in near:
-            for across in near:
+        near_y, near_x = (0, 0) if self.form == UNALIASED else _nearest(self.dy)
+        for down in range(-near_y, near_y + 1):
+            for across in range(-near_x, near_x + 1):
                 qy, qx = y + 2.0 * np.pi / self.dy * down, x + 2.0 * np.pi * across
                 image = np.log(np.maximum(squared_length(inverse, qy, qx), 1e-30))
                 image *= -1.0 - hurst
@@ -118,6 +122,11 @@ class MetricSpectrum:
         return np.asarray(polynomials.T @ (images.sum(axis=2) + beyond) @ polynomials)
 
 
+def _nearest(dy: float) -> tuple[int, int]:
+    """Return how many images each way along y and x are summed: they reach equally far."""
+    return round(max(1.0, dy)), round(max(1.0, 1.0 / dy))
+
+
 @lru_cache(maxsize=4)  # a metric is fitted with one exponent and one spread
 def _of_any_metric(
     hurst: float, spread: float, dy: float
@@ -130,15 +139,17 @@ def _of_any_metric(
     from scipy.special import gammaincc
 
     places = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    down, across = (k.ravel() for k in np.mgrid[-_IMAGES : _IMAGES + 1, -_IMAGES : _IMAGES + 1])
-    far = np.maximum(abs(down), abs(across)) > 1
+    near_y, near_x = _nearest(dy)
+    last_y, last_x = _IMAGES * near_y, _IMAGES * near_x
+    down, across = (k.ravel() for k in np.mgrid[-last_y : last_y + 1, -last_x : last_x + 1])
+    far = (abs(down) > near_y) | (abs(across) > near_x)
     y = np.pi / dy * (places[:, None, None] + 2.0 * down[far])
     x = np.pi * (places[:, None] + 2.0 * across[far])
     blur = np.exp(-(spread**2) * (y * y + x * x))
     # those beyond, as an integral over the outside of their rectangle
     azimuth = np.pi / 180.0 * (np.arange(360) + 0.5)
     sine, cosine = np.sin(azimuth), np.cos(azimuth)
-    edge = 2.0 * np.pi * (_IMAGES + 0.5) / np.maximum(np.abs(sine) * dy, np.abs(cosine))
+    edge = 2.0 * np.pi / np.maximum(np.abs(sine) * dy / (last_y + 0.5), np.abs(cosine) / (last_x + 0.5))
     z = np.square(spread * edge)
     blurred = spread ** (2.0 * hurst) * gammaincc(1.0 - hurst, z) * math.gamma(1.0 - hurst)
     polynomials = np.polynomial.chebyshev.chebvander(places, _NODES - 1) * (2.0 / _NODES)
@@ -164,26 +175,30 @@ def gaussian_tables(
     qy, qx = y[:, None] + 2.0 * np.pi / dy * down, x[:, None] + 2.0 * np.pi * across
     square = qy * qy + qx * qx
     waves = np.pi / (dy * t) * np.exp(squared_length(inverse, qy, qx)[..., None] * (-0.25 / t))
-    reach = math.ceil(_REACH * ratio * max(1.0, 1.0 / dy))
-    ry, rx = (
-        r.ravel()[: (2 * reach + 1) ** 2 // 2] for r in np.mgrid[-reach : reach + 1, -reach : reach + 1]
-    )
+    # of narrow Gaussians the sum over lags is the shorter one, of some lags at a time
+    wide = max(1.0, dy)
+    down, across = math.ceil(_REACH * ratio * wide / dy), math.ceil(_REACH * ratio * wide)
+    ry, rx = (r.ravel()[: r.size // 2] for r in np.mgrid[-down : down + 1, -across : across + 1])
     ry = ry * dy
-    cosines = 2.0 * np.cos(np.outer(y, ry) + np.outer(x, rx))
-    narrow = t > _NARROW / ratio
+    narrow, near = t > _NARROW / (ratio * wide**2), spreads[spreads < 0.3 * wide]
     once = t[narrow, None, None] * metric
+    blurred = np.eye(2) + 4.0 * np.square(near)[:, None, None, None] * once
+    forms = np.moveaxis(once @ np.linalg.inv(blurred), (2, 3), (0, 1)).reshape(2, 2, -1, 1)
+    sums = np.ones((y.size, forms.shape[2]))
+    for start in range(0, ry.size, _LAGS):
+        some = slice(start, start + _LAGS)
+        cosines = 2.0 * np.cos(np.outer(y, ry[some]) + np.outer(x, rx[some]))
+        sums += block_product(cosines, np.exp(-squared_length(forms, ry[some], rx[some])).T)
+    sums = sums.reshape(y.size, *blurred.shape[:2]) / np.sqrt(np.linalg.det(blurred))
     tables: list[list[Array]] = []
-    for spread in spreads:
+    for k, spread in enumerate(spreads):
         blur = np.exp(-(spread**2) * square)
         aliased = np.matmul(blur[:, None], waves)[:, 0]
-        if spread < 0.3:  # wider blurs end within the nine images
-            wider = np.eye(2) + 4.0 * spread**2 * once
-            forms = np.moveaxis(once @ np.linalg.inv(wider), 0, 2)[..., None]
-            lags = np.exp(-squared_length(forms, ry, rx)) / np.sqrt(np.linalg.det(wider))[:, None]
-            aliased[:, narrow] = 1.0 / np.sqrt(np.linalg.det(wider)) + block_product(cosines, lags.T)
+        if k < near.size:  # wider blurs end within the nine images
+            aliased[:, narrow] = sums[:, k]
         if not tables:
             sampled = aliased
         transfer = np.square(kernel_transfer(spread / dy, y * dy) * kernel_transfer(spread, x))
         unaliased = blur[:, 4, None] * waves[:, 4]
         tables.append([mean(each.T).T for each in (aliased, transfer[:, None] * sampled, unaliased)])
-    return np.moveaxis(np.array(tables), 1, 0)
+    return np.maximum(np.moveaxis(np.array(tables), 1, 0), 0.0)  # sums of lags end in rounding

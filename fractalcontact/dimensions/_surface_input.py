@@ -20,8 +20,6 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Scales = tuple[float, float] | None
 
 ROUNDING = 1e-12  # of the range of heights
-DECADES = 250  # powers of ten of a metre: heights are scaled before they are used
-SMALLEST_UNIT, LARGEST_UNIT = 2.0**-450, 2.0**450  # m: ranges whose second and fourth powers are finite
 MIDDLE = 128  # points to each side of the middle that are inspected for interpolation
 LARGEST = 4096  # edge of what is transformed at a time of a surface that is not in memory, 134 MB
 SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
@@ -263,16 +261,11 @@ def check_surface(
         Names of the result, which no leading dim may have.
     """
     before, surface = len(problems.messages), problems.given.surface
-    problems.surface(
-        "surface", finite=False, smallest=smallest, leading=True, profile=profile, decades=DECADES
-    )
+    problems.surface("surface", finite=False, smallest=smallest, leading=True, profile=profile)
     check_leading(surface, reserved, problems)
     if len(problems.messages) > before or is_lazy(surface):
         return len(problems.messages) == before
-    axes = len(_core_dims(surface))
-    _check_heights(problems, surface.values, axes, gaps)
-    if len(problems.messages) == before:
-        _check_squares(problems, np.asarray(surface.values).reshape(-1, int(np.prod(surface.shape[-axes:]))))
+    _check_heights(problems, surface.values, len(_core_dims(surface)), gaps)
     return len(problems.messages) == before
 
 
@@ -334,17 +327,6 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
 def _distinct(values: Array) -> Array:
     """Return values without the repetitions of a broadcast, as of the surface of a scene that is planned."""
     return values[tuple(slice(1 if step == 0 else None) for step in values.strides)]
-
-
-def _check_squares(problems: Problems, stack: Array) -> None:
-    ranges = [_height_range(np.asarray(heights, dtype=np.float64)) for heights in stack]
-    units = [power_of_two(high - low) for low, high in ranges if high > low]
-    if any(not SMALLEST_UNIT <= unit <= LARGEST_UNIT for unit in units):
-        expected = (
-            f"heights over a range of {SMALLEST_UNIT:.0e} m to {LARGEST_UNIT:.0e} m, "
-            "whose squares are numbers"
-        )
-        problems.add("surface", expected, f"a range of about {max(units):.0e} m")
 
 
 def middle_slices(shape: Iterable[int], edge: int) -> tuple[slice, ...]:

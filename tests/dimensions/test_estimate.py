@@ -343,12 +343,12 @@ def test_invalid_arguments(rough):
 
 @pytest.mark.parametrize("factor", [2.0**530, 2.0**-530])
 @pytest.mark.parametrize("name", ["estimate", "directions", "spectrum", "variogram", "cube_counts"])
-def test_heights_whose_squares_are_no_numbers_are_refused(rough, name, factor):
-    with pytest.raises(InvalidInput, match="whose squares are numbers"):
+def test_heights_whose_powers_are_no_numbers_are_refused(rough, name, factor):
+    with pytest.raises(InvalidInput, match="1e-100 to 1e100 m"):
         getattr(fc.dimensions, name)(rough.copy(data=rough.values * factor))
 
 
-@pytest.mark.parametrize("factor", [2.0**400, 2.0**-400])
+@pytest.mark.parametrize("factor", [2.0**280, 2.0**-280])
 def test_exponents_do_not_depend_on_the_unit_of_height(rough, of_rough, factor):
     here, there = of_rough(*SCALE_FREE), estimate(rough.copy(data=rough.values * factor), SCALE_FREE)
     np.testing.assert_array_equal(here.hurst, there.hurst)
