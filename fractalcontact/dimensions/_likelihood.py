@@ -78,12 +78,15 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
 def _of_azimuths(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate | None:
     """Return the estimate from Fourier modes, whose metric has any azimuth.
 
-    None if they are too few, or if their lengths hardly differ.
+    None if they are too few, or if lengths hardly differ: less than twice as much where no metric describes
+    the azimuths, as beside a step.
     """
     fit = fit_azimuths(first, window, known, least_log_ratio=NEAR_ISOTROPY)
     if fit is None:
         return None
     has_metric = not fit.p_values[1] < FALSE_ALARM
+    if not has_metric and math.hypot(*fit.uv) < 2.0 * NEAR_ISOTROPY:
+        return None
     estimate = _estimate(surface, first, fit.bins, fit.found, known)
     lag = float(fit.spectrum.metric[1, 1])  # of one x spacing, squared
     estimate = replace(estimate, rms_increment=estimate.rms_increment * lag ** (0.5 * estimate.hurst))
