@@ -126,8 +126,7 @@ class PlaneModes:
             expected = np.maximum(fft.rfft2(lags).real[::2, ::2], 1e-300)
         if spectrum.theta[SPREAD] == 0.0:
             return expected, clean, clean
-        sharp = spectrum.theta.copy()
-        sharp[SPREAD] = 0.0
+        sharp = np.where(np.arange(spectrum.theta.size) == SPREAD, 0.0, spectrum.theta)
         unblurred = replace(spectrum, theta=sharp).at(self.y, self.x)
         return expected, clean, self.filtered(unblurred, self.y, self.x)
 

@@ -282,8 +282,7 @@ class _Model:
         known = Known.of(scales is not None).over(1.0, rounding_noise(middle) / first.scale)
         lattice = replace(fit.lattice, shape=edges, periodic=False)
         pilot, clean = (expected_power(lattice, fit.theta, fit.form, edges=edge) for edge in (True, False))
-        sharp = fit.theta.copy()
-        sharp[SPREAD] = 0.0
+        sharp = np.where(np.arange(fit.theta.size) == SPREAD, 0.0, fit.theta)
         keep = clear_modes(pilot, clean, expected_power(lattice, sharp, fit.form, edges=False))
         keep &= between(2.0 * np.pi / lattice.q * middle.spacing[1], scales)
         if np.count_nonzero(keep) < LEAST * LEAST_BINS:

@@ -132,7 +132,10 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     if min(shape[-surface.axes :]) < 4:
         return None
     lattice = Lattice(shape, surface.plane_spacing, all(surface.grid.periodic) and is_complete)
-    heights = heights - heights[observed].mean() if lattice.periodic else _without_plane(heights)
+    if lattice.periodic:
+        heights = heights - heights[observed].mean()
+    else:
+        heights = detrended(heights.reshape(shape[-surface.axes :]), 1)[0].reshape(shape)
     scale = rms_increment(heights)
     heights /= scale
     filled = fill(heights)
@@ -153,18 +156,11 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     hypothesis, _, theta = posterior(bins, Known(spread), is_pilot=True).most_probable
     # levels follow the log ratio times the slope, which was assumed
     of_slope = 0.5 * (1.0 + torus.axes) / (1.0 + theta[HURST])
+    shrunk *= min(of_slope, LARGEST_LOG_RATIO / max(math.hypot(*shrunk), 1e-300))
     is_off_axes = bool(uv[1] ** 2 > float(chdtri(1, FALSE_ALARM)) * variance[1, 1])
-    return FirstFit(
-        heights,
-        filled,
-        scale,
-        replace(lattice, stretch=torus.stretch),
-        spread,
-        theta,
-        hypothesis.form,
-        shrunk * min(of_slope, LARGEST_LOG_RATIO / max(math.hypot(*shrunk), 1e-300)),
-        is_off_axes and not lattice.periodic and of_slope * math.hypot(*uv) > NEAR_ISOTROPY,
-    )
+    is_oblique = is_off_axes and not lattice.periodic and of_slope * math.hypot(*uv) > NEAR_ISOTROPY
+    lattice = replace(lattice, stretch=torus.stretch)
+    return FirstFit(heights, filled, scale, lattice, spread, theta, hypothesis.form, shrunk, is_oblique)
 
 
 def _tapered(heights: Array, lattice: Lattice, is_complete: bool) -> tuple[Lattice, Array]:
@@ -201,8 +197,7 @@ def fitted_modes(first: FirstFit, *, rounds: int = 12) -> ModeFit | None:
     pilot, is_settled = expected_power(lattice, theta, form), False
     for left in range(rounds, 0, -1):
         clean = expected_power(lattice, theta, form, edges=False)
-        sharp = theta.copy()
-        sharp[SPREAD] = 0.0
+        sharp = np.where(np.arange(theta.size) == SPREAD, 0.0, theta)
         unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
         keep = clear_modes(pilot, clean, unblurred)
         if not is_complete and not is_settled:
@@ -287,13 +282,6 @@ def log_ratio(
             break
     gain = float(weight @ (np.square(target) - np.square(target - logs(uv))))
     return uv, variance, significant_share(gain, free)
-
-
-def _without_plane(heights: Array) -> Array:
-    """Return heights less their plane, or those of a profile less their line."""
-    if heights.shape[0] == 1:
-        return detrended(heights[0], 1)[0][None]
-    return detrended(heights, 1)[0]
 
 
 def _without_rim(heights: Array) -> Array:
