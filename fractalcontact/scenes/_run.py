@@ -8,6 +8,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -241,8 +242,10 @@ def _run(
         whole = replace(whole, stages=stage_rows(tree))  # with the time of the figures
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
-        netcdf.replace_attributes(folder / RESULT, changed)
-        write_report(tree, folder / _results_folder.REPORT, pictures, whole, contents)
+        with ThreadPoolExecutor(1) as beside:  # the file waits for the disk while the page is written
+            replaced = beside.submit(netcdf.replace_attributes, folder / RESULT, changed)
+            write_report(tree, folder / _results_folder.REPORT, pictures, whole, contents)
+            replaced.result()
         if scene.want.datasheet and not study.failures:
             tables(tree, folder / _results_folder.TABLES)
             _draw_datasheet(tree, folder / _results_folder.DATASHEET)
