@@ -39,7 +39,7 @@ from fractalcontact.dimensions._mode_bins import (
     joined_classes,
     log_means,
 )
-from fractalcontact.dimensions._mode_fit import FirstFit, fitted_modes
+from fractalcontact.dimensions._mode_fit import FirstFit
 from fractalcontact.dimensions._spectral_posterior import HURST, NOISE, SPREAD, Known, Posterior, posterior
 from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
 
@@ -441,7 +441,7 @@ def fit_azimuths(
         found = replace(found, share=share / share.sum())
         return bins, found, *max(fits, key=lambda fit: float(found.share[fit[3]].sum()))[:2]
 
-    start = None if first.is_complete else fitted_modes(first)
+    start = None if first.is_complete else first.modes
     theta, form = (first.theta, first.form) if start is None else (start.theta, start.form)
     spectrum = MetricSpectrum(theta, form, first.log_ratio, dy)
     for _ in range(_ROUNDS):

@@ -256,7 +256,8 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
     background = 0.0 if first is None else rounding_noise(surface) / first.scale
     fit = None if first is None else fit_azimuths(first, lengths, known.over(1.0, background))
     if first is None or fit is None:
-        record = (smooth() if scales is None else undefined(NO_MODES)).limited()
+        too_smooth = smooth() if surface.is_complete else undefined(_FILLED)
+        record = (too_smooth if scales is None else undefined(NO_MODES)).limited()
         return _Directional([record] * azimuths.size, None, record.note)
     anisotropy = _Anisotropy.of(fit)
     reason = diagnose(surface)

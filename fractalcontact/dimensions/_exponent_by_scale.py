@@ -15,7 +15,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
 from fractalcontact.dimensions._likelihood import likelihood
-from fractalcontact.dimensions._mode_fit import first_fit, fitted_modes
+from fractalcontact.dimensions._mode_fit import first_fit
 from fractalcontact.dimensions._records import NORMAL
 from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD
 from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
@@ -175,7 +175,7 @@ def _record(surface: Surface, octaves: _Octaves) -> _Record:
     none = np.zeros(octaves.number, dtype=np.int64)
     undefined = [_PowerLaw()] * octaves.number
     first = None if surface.is_constant or surface.is_plane else first_fit(surface)
-    fit = None if first is None else fitted_modes(first)
+    fit = None if first is None else first.modes
     if fit is None or not fit.keep.any():
         return _Record(undefined, none, _PowerLaw(), none > 0, (math.nan, math.nan), "")
     bins = fit.bins()

@@ -42,7 +42,7 @@ from fractalcontact.dimensions._mode_bins import (
     log_means,
     make_bins,
 )
-from fractalcontact.dimensions._mode_fit import FirstFit, ModeFit, first_fit, fitted_modes
+from fractalcontact.dimensions._mode_fit import FirstFit, ModeFit, first_fit
 from fractalcontact.dimensions._records import CONSTANT, Estimate, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     HIGHEST,
@@ -210,15 +210,12 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     if middle is not None:
         scales = middle.resolved(scales)
     first = None if middle is None or middle.is_constant or is_plane else first_fit(middle)
-    fit = None if first is None else fitted_modes(first)
-    model = None
-    if middle is not None and first is not None and fit is not None:
-        model = _Model.of(middle, first, fit, windows.edges, scales)
+    model = None if middle is None or first is None else _Model.of(middle, first, windows.edges, scales)
     rows = [_spectra(model, surface, int(row), windows) for row in windows.rows]
     records = [record for row in rows for record in row[0]]
     chosen = np.flatnonzero([record is None for record in records])
     if model is None or chosen.size == 0:
-        others = undefined(NO_MODES) if fit is None or scales is not None else smooth()
+        others = undefined(NO_MODES) if first is None or not first.modes or scales is not None else smooth()
         return [record or (plane() if is_plane else others) for record in records]
     mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
     degrees = 0.5 * model.lattice.degrees * model.count * share
@@ -275,10 +272,11 @@ class _Model:
     expected: Array
 
     @classmethod
-    def of(
-        cls, middle: Surface, first: FirstFit, fit: ModeFit, edges: tuple[int, int], scales: Scales
-    ) -> _Model | None:
+    def of(cls, middle: Surface, first: FirstFit, edges: tuple[int, int], scales: Scales) -> _Model | None:
         """Prepare the windows of a surface; None where too few of their modes count."""
+        fit = first.modes
+        if fit is None:
+            return None
         known = Known.of(scales is not None).over(1.0, rounding_noise(middle) / first.scale)
         lattice = replace(fit.lattice, shape=edges, periodic=False)
         pilot, clean = (expected_power(lattice, fit.theta, fit.form, edges=edge) for edge in (True, False))

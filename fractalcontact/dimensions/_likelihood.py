@@ -24,7 +24,7 @@ from fractalcontact.dimensions._azimuths import NO_METRIC, fit_azimuths
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
 from fractalcontact.dimensions._gaussian_mixture import Bins
 from fractalcontact.dimensions._mode_bins import FALSE_ALARM, LEAST, LEAST_BINS
-from fractalcontact.dimensions._mode_fit import NEAR_ISOTROPY, FirstFit, first_fit, fitted_modes
+from fractalcontact.dimensions._mode_fit import NEAR_ISOTROPY, FirstFit, first_fit
 from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     CORNER,
@@ -95,7 +95,7 @@ def _of_azimuths(surface: Surface, first: FirstFit, window: Scales, known: Known
 
 def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate:
     """Return the estimate from cosine modes, or from the Fourier modes of a periodic surface."""
-    fit = fitted_modes(first)
+    fit = first.modes
     if fit is None:
         return undefined(NO_MODES)
     keep = fit.keep & between(2.0 * np.pi / fit.lattice.q, window)

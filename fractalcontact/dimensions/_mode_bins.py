@@ -28,9 +28,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
 EMPTY = 1e-14  # power over the pilot of modes that hold only rounding, as beyond the band of a synthesis
-# Range of the change of the logarithms of a pilot that needs no other correction. With 70 % of points missing
-# H is off by .02 to .08 (.06 to .18 after two rounds), half of .2 takes a third more rounds
-SETTLED = 0.2
+# Change of the logarithm of a pilot, times that of the correction for gaps, that needs no other one. With
+# 70 % of points missing H is off by .03 to .09 (.06 to .18 after two rounds), with .015 by .02 to .08
+SETTLED = 0.03
 LEAST_BINS = 3  # an amplitude, an exponent, and one that can contradict them
 TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/35)^2
 # Modes of a bin in a table of a first fit, and of the posterior. With the first number, and its steps of the

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -82,6 +83,56 @@ class FirstFit:
     form: int
     log_ratio: Array
     is_oblique: bool
+
+    @cached_property
+    def modes(self) -> ModeFit | None:
+        """Cosine modes, or Fourier modes of a periodic surface; None if too few count.
+
+        Stretch, gaps and pilot are corrected until the correction is `SETTLED`: with 10 % of gaps once or
+        twice, with 70 % up to eight times.
+        """
+        lattice, theta, form = self.lattice, self.theta, self.form
+        if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
+            return None
+        observed, is_complete = np.isfinite(self.heights), self.is_complete
+        modes = lattice.power(self.filled)
+        correction: Array | float = 1.0
+        information: Array | float = 1.0
+        pilot, is_settled = expected_power(lattice, theta, form), False
+        for left in range(12, 0, -1):  # up to 8 were made
+            clean = expected_power(lattice, theta, form, edges=False)
+            sharp = np.where(np.arange(theta.size) == SPREAD, 0.0, theta)
+            unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
+            keep = clear_modes(pilot, clean, unblurred)
+            if not is_complete and not is_settled:
+                correction = filling_ratio(lattice, pilot, observed)
+                information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
+            power = modes if is_complete else modes / correction
+            keep &= power > EMPTY * pilot
+            if not keep.any():
+                return None
+            ratio = whitened(lattice, power, pilot, keep)
+            keep &= ~single_waves(lattice, ratio, keep)
+            levels = levels_by_azimuth(lattice, ratio, keep)
+            level = lay(lattice, levels)
+            if is_settled:
+                break
+            now = np.array([math.log(lattice.stretch), 0.0])
+            uv, _, share = log_ratio(levels, now, levels.slope(unblurred))
+            stretch = math.exp(share * uv[0])
+            if is_complete and lattice.stretch == stretch == 1.0:
+                break
+            if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
+                bins = make_bins(lattice, power / level, pilot, keep, information=information, is_pilot=True)
+                hypothesis, _, theta = posterior(bins, Known(self.spread), is_pilot=True).most_probable
+                form = hypothesis.form
+            lattice = replace(lattice, stretch=stretch)
+            before, pilot = pilot, expected_power(lattice, theta, form)
+            change = np.log(pilot / before)
+            change = (change - change[keep].mean()) * np.log(correction)
+            is_settled = left == 2 or bool(np.abs(change[keep]).max() < SETTLED)
+        information = information / unevenness(self.heights)
+        return ModeFit(lattice, power / level, pilot, keep, information, theta, form)
 
     @property
     def is_complete(self) -> bool:
@@ -181,53 +232,6 @@ def _tapered(heights: Array, lattice: Lattice, is_complete: bool) -> tuple[Latti
     return torus, torus.power(heights * (tapers[0][:, None] * tapers[1]))
 
 
-def fitted_modes(first: FirstFit, *, rounds: int = 12) -> ModeFit | None:
-    """Return the modes of a surface; None if it has too few.
-
-    Stretch, gaps and pilot are corrected until the pilot is `SETTLED`: with 10 % of gaps once or twice, with
-    70 % up to eight times.
-    """
-    lattice, theta, form = first.lattice, first.theta, first.form
-    if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
-        return None
-    observed, is_complete = np.isfinite(first.heights), first.is_complete
-    modes = lattice.power(first.filled)
-    correction: Array | float = 1.0
-    information: Array | float = 1.0
-    pilot, is_settled = expected_power(lattice, theta, form), False
-    for left in range(rounds, 0, -1):
-        clean = expected_power(lattice, theta, form, edges=False)
-        sharp = np.where(np.arange(theta.size) == SPREAD, 0.0, theta)
-        unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
-        keep = clear_modes(pilot, clean, unblurred)
-        if not is_complete and not is_settled:
-            correction = filling_ratio(lattice, pilot, observed)
-            information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
-        power = modes if is_complete else modes / correction
-        keep &= power > EMPTY * pilot
-        if not keep.any():
-            return None
-        ratio = whitened(lattice, power, pilot, keep)
-        keep &= ~single_waves(lattice, ratio, keep)
-        levels = levels_by_azimuth(lattice, ratio, keep)
-        level = lay(lattice, levels)
-        if is_settled:
-            break
-        uv, _, share = log_ratio(levels, np.array([math.log(lattice.stretch), 0.0]), levels.slope(unblurred))
-        stretch = math.exp(share * uv[0])
-        if is_complete and lattice.stretch == stretch == 1.0:
-            break
-        if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
-            bins = make_bins(lattice, power / level, pilot, keep, information=information, is_pilot=True)
-            hypothesis, _, theta = posterior(bins, Known(first.spread), is_pilot=True).most_probable
-            form = hypothesis.form
-        lattice = replace(lattice, stretch=stretch)
-        before, pilot = pilot, expected_power(lattice, theta, form)
-        is_settled = left == 2 or bool(np.ptp(np.log(pilot[keep] / before[keep])) < SETTLED)
-    information = information / unevenness(first.heights)
-    return ModeFit(lattice, power / level, pilot, keep, information, theta, form)
-
-
 def log_ratio(
     levels: Levels, before: Array, slope: float, information: float = 1.0, *, rounds: int = 30
 ) -> tuple[Array, Array, float]:
@@ -263,11 +267,10 @@ def log_ratio(
     if np.count_nonzero(known) <= free + 1:  # a profile has one
         return np.zeros(2), variance, 0.0
 
+    sine, cosine = np.sin(levels.azimuth), np.cos(levels.azimuth)
+
     def logs(uv: Array) -> Array:
-        lengths = squared_length(
-            np.linalg.inv(metric_of(*uv)), np.sin(levels.azimuth), np.cos(levels.azimuth)
-        )
-        values = 0.5 * slope * np.log(lengths)
+        values = 0.5 * slope * np.log(squared_length(np.linalg.inv(metric_of(*uv)), sine, cosine))
         return np.asarray(values - weight @ values / weight.sum())
 
     target = levels.level + logs(before)

@@ -5,13 +5,13 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.dimensions import _spectral_posterior as sp
-from fractalcontact.dimensions._mode_fit import first_fit, fitted_modes
+from fractalcontact.dimensions._mode_fit import first_fit
 from fractalcontact.dimensions._surface_input import read_surfaces
 
 
 def bins_of(hurst, n=96, seed=1):
     surface = fc.surfaces.fbm((n, n), 1e-4, hurst=hurst, rms_increment=1e-6, rng=seed)
-    return fitted_modes(first_fit(read_surfaces(surface)[0])).bins()
+    return first_fit(read_surfaces(surface)[0]).modes.bins()
 
 
 def log_density(bins, theta, form=0):
