@@ -60,7 +60,7 @@ _CUT_OFF = 1e-4  # power of a ring over that an octave before; a blur of a spaci
 # waves of white noise make a blurred lay as probable as the noise (3 of 4 surfaces)
 _PRIOR_LOG_RATIO = math.log(2.0)
 _POSSIBLE = 1e-3  # probability of a hypothesis whose azimuths are looked at
-_ROUNDS = 12  # of a fit, 2 to 6 of which were needed
+_ROUNDS = 12  # of a fit, 1 to 6 of which were needed; 64 x 64 points under a lay of 8 to 1 may not settle
 IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
 NO_METRIC = "the surface does not fit the model, anisotropic fractional Brownian: the scatter is unknown"
 _EXPONENTS, _STEP = np.linspace(0.02, 0.98, 13, retstep=True)  # between which logarithms are linear to 1 %

@@ -78,8 +78,8 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
 def _of_azimuths(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate | None:
     """Return the estimate from Fourier modes, whose metric has any azimuth.
 
-    None if they are too few, or if lengths hardly differ: less than twice as much where no metric describes
-    the azimuths, as beside a step.
+    None if they are too few, or if the log ratio of lengths is below `NEAR_ISOTROPY`. Where no metric
+    describes the azimuths, as beside a step, twice that is the limit.
     """
     fit = fit_azimuths(first, window, known, least_log_ratio=NEAR_ISOTROPY)
     if fit is None:

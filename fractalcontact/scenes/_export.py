@@ -104,10 +104,10 @@ def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
     names = [name for name, variable in dataset.data_vars.items() if variable.dims == dims]
     variables: dict[Any, Any] = {dim: xr.Variable(dim, np.arange(size)) for dim, size in sizes.items()}
     variables |= dataset.variables  # a dim may have no coordinate
-    return DataFrame({
-        heading(dataset, str(name)): variables[name].set_dims(sizes).values.ravel()
-        for name in (*dims, *coords, *names)
-    })  # fmt: skip
+    columns = (*dims, *coords, *names)
+    return DataFrame(
+        {heading(dataset, str(name)): variables[name].set_dims(sizes).values.ravel() for name in columns}
+    )
 
 
 def heading(dataset: xr.Dataset, name: str) -> str:

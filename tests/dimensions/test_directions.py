@@ -495,3 +495,18 @@ def test_white_noise_has_no_exponent_but_zero(seed):
     white = fc.surfaces.from_array(np.random.default_rng(seed).standard_normal((128, 128)), SPACING)
     result = fc.dimensions.directions(white)
     assert not (result["ci_low"] > 0.01).any()
+
+
+def test_a_step_keeps_its_interval_and_a_lay_on_another_surface_has_none():
+    """No metric describes either of them; beside a step lengths hardly differ by azimuth."""
+    y, x = np.mgrid[:128, :128] - 64.0
+    step = 5.0 * (np.cos(0.4) * x + np.sin(0.4) * y > 13.0)
+    for seed in range(3):
+        rough = brownian(128, 0.5, seed)
+        beside = fc.dimensions.estimate(fc.surfaces.from_array(rough.values + 1e-6 * step, SPACING))
+        assert float(beside.ci_low[0]) < 0.5 < float(beside.ci_high[0])
+        turned = oblique(128, 0.5, seed, (4, 1), (1, 2)).values
+        both = fc.surfaces.from_array(turned + rough.values, SPACING)
+        withheld = fc.dimensions.estimate(both)
+        assert np.isnan(withheld.ci_low[0])
+        assert "does not fit the model" in withheld.reason.item()
