@@ -1,5 +1,6 @@
 """Results of surfaces, sets and joints that have no answer: every NaN comes with its reason."""
 
+import functools
 import warnings
 
 import numpy as np
@@ -36,6 +37,7 @@ HEIGHTS = {
 SHAPES = ((1, 1), (2, 2), (3, 3), (1, 50), (7, 11), (24, 24), (40, 40))
 
 
+@functools.cache
 def surfaces():
     found = {name: fc.surfaces.from_array(heights, 1e-4) for name, heights in HEIGHTS.items()}
     flat = found["flat"].copy()
@@ -44,6 +46,7 @@ def surfaces():
     return found | {"flat and periodic": flat}
 
 
+@functools.cache
 def masks():
     def of(cells):
         return xr.DataArray(cells, dims=("y", "x"))
@@ -64,6 +67,7 @@ def masks():
     return found | {"steps": xr.concat(steps, "step"), "empty steps": xr.concat([steps[0]] * 3, "step")}
 
 
+@functools.cache
 def cracks():
     names = ("flat", "ramp", "spike", "step", "grooves")
     found = {name: crack_of(HEIGHTS[name]) for name in names}
@@ -76,12 +80,14 @@ def crack_of(heights, **options):
     return fc.joints.Crack(fc.surfaces.from_array(heights, 1e-4), block=block, **options)
 
 
+@functools.cache
 def gaps():
     flat = fc.surfaces.from_array(np.zeros((24, 24)), 1e-4)
     wall = (flat + 1e-5).where(flat.x > flat.x[0], 0.0)
     return {"closed": flat, "open": flat + 1e-5, "wall": wall}
 
 
+@functools.cache
 def closures():
     loads = [0.0, 1.0, 10.0, 30.0, 100.0]
     return {
@@ -91,6 +97,7 @@ def closures():
     }
 
 
+@functools.cache
 def dilatancies():
     shear = {"shear": [0.0, 0.5e-4, 1e-4], "direction": ["E", "W"]}
     found = {name: fc.joints.dilatancy(crack, **shear) for name, crack in cracks().items()}

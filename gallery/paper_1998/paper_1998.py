@@ -63,10 +63,10 @@ def claim(section, words, condition):
     return register
 
 
-def findings(study):
-    """Return a row for every claim: section, claim, what the study gives, verdict, condition of a "yes"."""
+def findings(study, claims=CLAIMS):
+    """Return a row for each claim: section, claim, what the study gives, verdict, condition of a "yes"."""
     rows = []
-    for section, words, condition, test in CLAIMS:
+    for section, words, condition, test in claims:
         try:
             result, verdict = test(study)
         except KeyError:
