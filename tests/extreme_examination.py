@@ -52,10 +52,10 @@ def examine(case: Case, only: str = "") -> list[Result]:
     returns finite numbers, or NaN with a reason, or refuses the input with an `InvalidInput`.
     Any other exception, and an infinite or unexplained value, fails.
     """
+    case = replace(case, make=cache(case.make))  # one input or one call serves all quantities
     if case.input_type == "call":
         functions = dict.fromkeys(_function_of(quantity) for quantity in case.expected)
-        call = cache(case.make)  # one call serves all quantities
-        return [result for name in functions for result in _run(case, name, lambda *_: call())]
+        return [result for name in functions for result in _run(case, name, lambda *_: case.make())]
     probes = SURFACE_PROBES if case.input_type == "surface" else MASK_PROBES
     results = [result for name, probe in probes.items() if only in name for result in _run(case, name, probe)]
     unknown = [quantity for quantity in case.expected if _function_of(quantity) not in probes]

@@ -100,14 +100,14 @@ def test_open_surroundings_do_not_matter(control):
 
 
 def test_single_precision_start_same_solution(monkeypatch):
-    """A large solution starts in single precision, here from 256 x 256 points on; four by four are as one."""
-    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 256 * 256)
+    """A large solution starts in single precision, here from 128 x 128 points on; two by two are as one."""
+    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 128 * 128)
     tile = rough(64)
-    plane = fc.surfaces.from_array(np.tile(tile.values, (4, 4)), 1e-4, periodic=True)
+    plane = fc.surfaces.from_array(np.tile(tile.values, (2, 2)), 1e-4, periodic=True)
     double, mixed = (
         press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12) for surface in (tile, plane)
     )
-    np.testing.assert_array_equal(mixed["state"], np.tile(double["state"], (1, 4, 4)))
+    np.testing.assert_array_equal(mixed["state"], np.tile(double["state"], (1, 2, 2)))
     np.testing.assert_allclose(mixed["closure"], double["closure"], rtol=1e-12)
 
 
