@@ -177,6 +177,16 @@ def friction(
     return result
 
 
+def peak_angle(
+    dilatancy: xr.Dataset, basic_friction_angle: float, form: str, distance: float
+) -> xr.DataArray:
+    """Return the `peak_friction_angle` of `friction` alone, over all other dims, such as members."""
+    opening = drop_unknown_coords(dilatancy[_dilatancy_name(dilatancy)]).drop_attrs()
+    lift = opening.copy(data=work_per_force(dilatancy, form))
+    secants = _secant_angles(lift, distance) + basic_friction_angle
+    return _peaks(secants, None, distance)["peak_friction_angle"]
+
+
 def work_per_force(dilatancy: xr.Dataset, form: str) -> Array:
     """Return the curve (m) whose slope is T/N, the tangent of the angle at which the faces climb.
 

@@ -140,20 +140,10 @@ def _strength_over_half(friction: xr.Dataset) -> float | None:
 
 def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
     """Return the peak friction angle of the energy form over the same distance, of every member."""
-    from fractalcontact import joints
+    from fractalcontact.joints._friction import peak_angle
 
-    distance = float(friction["peak_distance"].max())
-    members = range(elastic.sizes[MEMBER]) if MEMBER in elastic.dims else [None]
-    peaks = [
-        joints.friction(
-            elastic if number_of_member is None else elastic.isel({MEMBER: number_of_member}),
-            basic_friction_angle=float(friction["basic_friction_angle"].mean()),
-            form="energy",
-            distance=distance,
-        )["peak_friction_angle"]
-        for number_of_member in members
-    ]
-    return peaks[0] if members == [None] else xr.concat(peaks, MEMBER)
+    basic_angle = float(friction["basic_friction_angle"].mean())
+    return peak_angle(elastic, basic_angle, "energy", distance=float(friction["peak_distance"].max()))
 
 
 def _peak_distance(state: xr.Dataset) -> str | None:

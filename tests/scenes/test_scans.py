@@ -285,15 +285,15 @@ def test_a_scene_that_fits_no_scan_is_refused(tmp_path):
 
 
 def test_command_prints_a_row_for_each_scan_and_tells_failures_by_its_exit(tmp_path):
-    names = [*GRIDS][:2]
+    names = [*GRIDS][:3]
     write_scans(tmp_path, {name: GRIDS[name] for name in names})
     files = [tmp_path / "scans" / name for name in (*names, "bad.nc")]
     files[-1].write_bytes(b"")
-    done = copied_command("roughness", *files, "-o", tmp_path / "out")
+    done = copied_command("roughness", *files[1:], "-o", tmp_path / "out")
     assert done.returncode == 1, done.stderr
     lines = done.stdout.splitlines()
     assert len(lines) <= 40
-    assert sum(line.startswith(tuple(names)) for line in lines) == len(names)
+    assert sum(line.startswith(tuple(names[1:])) for line in lines) == 2
     assert any(line.startswith("dimension D") for line in lines)
     refused = copied_command("joint", *files, "--young", "30GPa", "-o", tmp_path / "joint")
     assert refused.returncode == 2
