@@ -159,7 +159,9 @@ def friction(
     if form == "energy":
         result["frictionless_angle"] = _angle(lift, smoothing)
     result["friction_angle"] = _angle(lift, smoothing) + basic_angle
-    pressure = drop_unknown_coords(dilatancy["nominal_pressure"]) if name == "dilatancy" else None
+    pressure = None
+    if name == "dilatancy":
+        pressure = drop_unknown_coords(dilatancy["nominal_pressure"]).drop_attrs()
     if nominal_pressure is not None:
         values = float_array(nominal_pressure)
         pressure = xr.DataArray(values, dims="step", coords={"step": np.arange(values.size)})
@@ -171,20 +173,10 @@ def friction(
     result = result.assign(_peaks(secants, pressure, length).data_vars)
     _, lengths = dilatancy_slopes(shears, np.zeros((shears.size, 1)), smoothing)
     result["basic_friction_angle"], result["smoothing"] = basic_angle, ("shear", lengths)
-    result = result.drop_attrs().assign_attrs(slope_of=name)  # of the shear under the name of a peak
+    result = result.assign_attrs(slope_of=name)
     result["friction_angle"].attrs["comment"] = FORMS[form]
     _explain(result, secants)
     return result
-
-
-def peak_angle(
-    dilatancy: xr.Dataset, basic_friction_angle: float, form: str, distance: float
-) -> xr.DataArray:
-    """Return the `peak_friction_angle` of `friction` alone, over all other dims, such as members."""
-    opening = drop_unknown_coords(dilatancy[_dilatancy_name(dilatancy)]).drop_attrs()
-    lift = opening.copy(data=work_per_force(dilatancy, form))
-    secants = _secant_angles(lift, distance) + basic_friction_angle
-    return _peaks(secants, None, distance)["peak_friction_angle"]
 
 
 def work_per_force(dilatancy: xr.Dataset, form: str) -> Array:

@@ -140,10 +140,15 @@ def _strength_over_half(friction: xr.Dataset) -> float | None:
 
 def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
     """Return the peak friction angle of the energy form over the same distance, of every member."""
-    from fractalcontact.joints._friction import peak_angle
+    from fractalcontact import joints
 
-    basic_angle = float(friction["basic_friction_angle"].mean())
-    return peak_angle(elastic, basic_angle, "energy", distance=float(friction["peak_distance"].max()))
+    peak: xr.DataArray = joints.friction(
+        elastic,
+        basic_friction_angle=float(friction["basic_friction_angle"].mean()),
+        form="energy",
+        distance=float(friction["peak_distance"].max()),
+    )["peak_friction_angle"]
+    return peak
 
 
 def _peak_distance(state: xr.Dataset) -> str | None:
