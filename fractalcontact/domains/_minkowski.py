@@ -133,7 +133,11 @@ def _count_offsets(
     above, below = np.empty((2, *cells.shape), np.int16 if is_short else np.int32)
     rows_to_set(cells, reach[0], periodic[0], above, below)
     observed = np.broadcast_to(np.uint8(1), cells.shape) if valid is None else valid
-    high, wide = ((np.arange(n + 1) * step) ** 2 for n, step in zip(reach, steps, strict=True))
+    # in squares of the shorter spacing, rounded: equal distances are then equal in any unit
+    shorter = min(steps)
+    high, wide = (
+        np.round((np.arange(n + 1) * (step / shorter)) ** 2, 6) for n, step in zip(reach, steps, strict=True)
+    )
     counts = np.zeros((reach[0] + 1, reach[1] + 1), np.int64)
     count_offsets(above, below, observed, high, wide, periodic[0], periodic[1], counts)
     return counts

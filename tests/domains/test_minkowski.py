@@ -46,6 +46,16 @@ def test_area_matches_distances_cell_by_cell(wraps):
         assert dilated_area(cells, radii, spacing, wraps) == pytest.approx(expected, rel=1e-13)
 
 
+@pytest.mark.parametrize("ratio", [1.0, 1.5, 2.0])
+def test_nearest_cells_do_not_depend_on_the_unit(ratio):
+    cells = np.random.default_rng(0).random((60, 80)) < 0.03  # many cells have several nearest ones
+    mask, radii = cells.astype(np.uint8), np.array([1.0, 2.0, 4.0, 8.0])
+    expected = dilated_area(mask, radii, (1.0, ratio))
+    for spacing in (1e-9, 3e-4, 1e-3, 0.7, 1e6):
+        area = dilated_area(mask, radii, (spacing, spacing * ratio))
+        assert area == pytest.approx(expected, rel=1e-9)
+
+
 @pytest.mark.parametrize("ratio", [1.5, 2e5])  # of the spacings; offsets beyond 2^14 rows are stored as int32
 def test_area_matches_the_distance_transform(ratio):
     n = 128
