@@ -236,7 +236,7 @@ def _answer(options: argparse.Namespace) -> int:
         ("wall_strength", "--jcs", "weaker than any rock", "MPa"),
     ):
         value = arguments.get(name)
-        if value is not None and value < 1e4:  # Pa: below the softest gels, and the weakest clays
+        if value is not None and 0 < value < 1e4:  # Pa: below the softest gels, and the weakest clays
             message = f"{option}: {value:g} Pa is {what}; is it {value:g} {unit}?"
             warn(message, ScaleWarning)
     place = "." if options.scene else folder

@@ -323,6 +323,9 @@ def test_soft_modulus_warns_once(scans, capsys):
     done = command_here("contact", "lower.nc", "--young", "30", "--scene")
     assert done.returncode == 0
     assert done.stderr.count("is it 30 GPa?") == 1
+    negative = command_here("contact", "lower.nc", "--young=-3GPa", "--scene")
+    assert "young: expected a finite number > 0" in negative.stderr
+    assert "is it" not in negative.stderr
     with pytest.raises(SystemExit):
         main(["contact", "lower.nc", "--young", "soft"])
     assert "30 GPa" in capsys.readouterr().err
