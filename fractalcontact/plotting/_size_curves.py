@@ -258,6 +258,8 @@ def box_dimension(
     data = result_of(dataset, (present or DIMENSIONS)[:1], PATH, units)
     shown, shears = path_panels(axes, data), _paths.by_shear(data)
     first, *_, last = (*shown.values(), *shown.values())
+    # the boundary has none also where there is contact, without an interior
+    empty = "no dimension" if present[0] == "boundary_dimension" else "no contact"
     for dim, ax in shown.items():
         if dim == "step":
             panel = _draw_dimension(ax, data, present[0], PATH, shears)
@@ -271,7 +273,7 @@ def box_dimension(
             ax.set_ylabel("")
         panel.family = shears if data.sizes["step"] > 1 else Family([])
         log = "x" if _style.needs_log_axis(panel.x.values) else ""
-        panel.finish(log=log, legend=ax is last, empty="no contact")
+        panel.finish(log=log, legend=ax is last, empty=empty)
         ax.set_ylim(-0.05, 2.05)
     return as_array(shown)
 
@@ -285,8 +287,9 @@ def _draw_dimension(
     x, y = panel.x.values, panel.y.values
     reliable, described = np.full(y.shape, True), "interval wider than 0.5, or none"
     panel.key("contact domain", marker="o")
-    if set(INTERVAL) <= path.variables.keys():
-        low, high = map(panel.values, INTERVAL)
+    interval = panel.interval(name)  # of `describe`, whose dimensions have an interval each
+    if interval or set(INTERVAL) <= path.variables.keys():
+        low, high = interval or map(panel.values, INTERVAL)
         reliable = high - low <= 0.5  # a quarter of the range of dimensions in a plane
         panel.area_key("interval", facecolor=_style.grey(), alpha=0.25)
         if len(y) == 1:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import Drawing, StudyFigure, figure
@@ -133,7 +135,7 @@ def friction(
         From `fractalcontact.joints.friction`: friction_angle (degree) over (direction, shear, step), with
         shear_strength (Pa) if forces are given; basic_friction_angle (degree) is drawn as a line.
     direction : str, optional
-        Direction to draw; required if there are several directions and forces. Without forces each
+        Direction to draw; required of several with several forces or pressures. Without those each
         direction gets a curve.
     {shared}
 
@@ -150,6 +152,8 @@ def friction(
     selected = _paths.limit_shear(_paths.select_direction(result, None, units), reach)
     names = ["friction_angle", "shear_strength"] if "shear_strength" in selected else ["friction_angle"]
     by_force = "friction_angle" in selected and "step" in selected["friction_angle"].dims
+    if "shear_strength" in selected and selected["shear_strength"].sizes.get("step", 1) > 1:
+        by_force = True  # rigid faces: one angle, and a strength for each pressure
     over = "step" if by_force else "direction"
     if by_force or direction is not None:
         selected = _paths.select_direction(selected, direction)
@@ -191,18 +195,22 @@ def _slope_lengths(data: xr.Dataset) -> str:
 def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the shear strength of a joint under self-weight against the size of the structure.
 
-    One colour for each direction of sliding, one line style for each shear. A grey line is the strength for
-    the basic friction angle alone, which grows as the size. Curves are missing where the faces lock.
+    One colour for each direction of sliding, one line style for each shear, of at most three. A grey line is
+    the strength for the basic friction angle alone, which grows as the size. Curves are missing where the
+    faces lock.
     """
     names = ("shear_strength", "structure_size", "nominal_pressure", "basic_friction_angle", "shear")
     dims = ("shear", "direction", "structure_size")
     data = result_of(result, names, dims, units)
+    data = data.isel(shear=spread_indices(data.sizes["shear"], 3))
     size = quantity(data, "structure_size", ("structure_size",), "size of the structure")
     strength, shears = quantity(data, "shear_strength", dims), _paths.by_shear(data)
-    panel = LinePanel.of(ax, data, size, strength, dims[1:], _paths.by_direction(data))
+    directions = _paths.by_direction(data)
+    coloured = replace(directions, styles=[{"color": style["color"]} for style in directions.styles])
+    panel = LinePanel.of(ax, data, size, strength, dims[1:], coloured)
     for i, values in enumerate(strength.values):
         key = shears.labels[i] if shears.labels else ""
-        panel.curves(shears.curve("shear strength", i), values, key=key, ls=_style.LINES[i % 3])
+        panel.curves(shears.curve("shear strength", i), values, key=key, ls=_style.LINES[i])
     angle = np.radians(table(data, "basic_friction_angle", ()))
     basic = table(data, "nominal_pressure", ("structure_size",)) * np.tan(angle)
     name = "basic angle alone"

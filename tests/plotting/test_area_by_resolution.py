@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.legend import Legend
 from plotting_figures import drawn, figure_of, holds, render
 
 from fractalcontact import plotting
@@ -71,6 +72,20 @@ def test_strength_of_every_direction_and_shear():
             assert holds(curves, result.structure_size, result.shear_strength[direction, shear])
     assert holds(curves, result.structure_size, result.nominal_pressure)  # tan 45 degree
     render(figure)
+
+
+def test_lines_of_strengths_tell_the_shears_apart():
+    result = strengths().isel(shear=[1, 1, 1, 1]).assign_coords(shear=[1e-4, 2e-4, 4e-4, 8e-4])
+    figure = figure_of(plotting.plot(result, "self_weight"))
+    lines = {line.get_label(): (line.get_color(), line.get_linestyle()) for line in figure.axes[0].lines}
+    assert len(lines) == len(set(lines.values())) == 7  # two directions, three of four shears, basic angle
+    directions = [
+        line.get_linestyle()
+        for key in figure.findobj(Legend)
+        for line, text in zip(key.get_lines(), key.get_texts(), strict=True)
+        if text.get_text() in ("East", "North")
+    ]
+    assert directions == ["-", "-"]  # the style of a line is its shear
 
 
 @pytest.mark.parametrize("dim", ["shear", "direction", "structure_size"])

@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 from plotting_figures import factor, holds
 
+import fractalcontact as fc
 from fractalcontact import plotting
 
 
@@ -96,3 +97,23 @@ def test_local_slopes_and_null():
     ax.figure.draw_without_rendering()
     (title,) = ax.findobj(lambda each: getattr(each, "get_text", str)() == "$v$ = 1 mm")
     assert not title.get_window_extent().overlaps(ax.texts[0].get_window_extent())
+
+
+def test_described_dimension_has_its_interval_and_open_points(closed):
+    result = synthetic.box_dimension(closed).isel(shear=0).copy(deep=True)
+    result["ci_high"].values[0] += 0.6
+    described = result.rename(ci_low="box_dimension_low", ci_high="box_dimension_high")
+    (alone,), (ax,) = plotting.box_dimension(result), plotting.box_dimension(described)
+    assert len(ax.lines) == len(alone.lines)
+    for mine, other in zip(ax.lines, alone.lines, strict=True):
+        np.testing.assert_array_equal(mine.get_xydata(), other.get_xydata())
+        assert mine.get_markerfacecolor() == other.get_markerfacecolor()
+    (band,), (other,) = (each.collections for each in (ax, alone))
+    np.testing.assert_array_equal(band.get_paths()[0].vertices, other.get_paths()[0].vertices)
+
+
+def test_boundary_without_a_dimension_is_not_called_free_of_contact():
+    mask = xr.DataArray(np.eye(32, dtype=bool), dims=("y", "x"))
+    result = fc.domains.boundary_dimension(mask)
+    assert int(result.boundary_sides) > 0
+    assert plotting.box_dimension(result)[0].texts[0].get_text() == "no dimension"

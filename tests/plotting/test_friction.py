@@ -2,8 +2,10 @@
 
 import numpy as np
 import plotting_synthetic as synthetic
+import pytest
 from plotting_figures import drawn, holds
 
+import fractalcontact as fc
 from fractalcontact import plotting
 
 
@@ -35,3 +37,17 @@ def test_axis_ends_at_locking_angle():
     assert strength.get_yscale() == "linear"
     rubbed["shear_strength"].values[0, 0, 0] *= 1e-3
     assert plotting.friction(rubbed)[1].get_yscale() == "log"
+
+
+def test_rigid_friction_under_several_pressures():
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    crack = fc.joints.Crack(face, block=1.6e-3)
+    opening = fc.joints.dilatancy(crack, shear=[0.0, 1e-4, 2e-4, 3e-4], direction=["E", "N"])
+    rubbed = fc.joints.friction(opening, nominal_pressure=[1e6, 5e6])
+    angle, strength = plotting.friction(rubbed, direction="N")
+    expected = rubbed.sel(direction="N")
+    assert holds(drawn(angle), expected.shear, expected.friction_angle)
+    for step in range(2):
+        assert holds(drawn(strength), expected.shear, expected.shear_strength.isel(step=step))
+    with pytest.raises(ValueError, match="one direction"):
+        plotting.friction(rubbed)
