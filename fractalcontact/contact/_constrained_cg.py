@@ -198,7 +198,7 @@ class ConstrainedCG:
         self.epsilon = float(np.finfo(self.dtype).eps)
         self.transforms_before = self.operator.transforms + self.preconditioner.transforms
         self.blocks = self.preconditioner.bin_shape[0]
-        self.block_sums = np.zeros((self.blocks, 8))
+        self.block_sums = np.zeros((self.blocks, 8))  # as many as `residual_sums` has, the most
 
         shape = self.h.shape
         self.p = np.zeros(shape, dtype=self.dtype)  # pressure

@@ -272,7 +272,7 @@ def restore_sum(y: Array, bound: Array, force: Array, slips: Array) -> Array:
     """
     c, start = np.zeros(2), y / bound
     goal = 1e-15 * float(bound.sum())  # rounding of the sum; 1e3 times as much is still far below a tolerance
-    for _ in range(20):  # Newton's method from a sum that is nearly right: a handful of steps
+    for _ in range(20):  # Newton's method from a sum that is nearly right; 10 gave the same bits, 5 not
         x = start + c[:, None]
         size = np.hypot(*x)
         on_circle = slips | (size > 1)
@@ -295,6 +295,8 @@ def project(y: Array, bound: Array, force: Array) -> Array:
     """Return the nearest traction with |q| <= bound and the sum `force`: clip(y + c), c after Newton."""
     c = np.zeros(2)
     value, q, jacobian = _clipped(y, c, bound, force)
+    # rounding of the sum; on 8 rough contacts 1e-13 took the same transforms, 1e-16 is not reached. 20 steps
+    # and 1000, and steps down to 1e-5 and to 1e-14, gave the same bits
     goal = 1e-15 * max(float(np.abs(force).max()), float(bound.sum()))
     for _ in range(100):
         miss = q.sum(1) - force

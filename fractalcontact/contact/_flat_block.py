@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.grid import Grid
+from fractalcontact.base.grid import DECADES, Grid
 from fractalcontact.base.numbers import as_array, float_array
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._problem import (
@@ -87,7 +87,8 @@ def flat_stiffness(
             getattr(as_array(shape), "shape", None) == (2,), "shape", "(ny, nx)", shape
         )
         has_shape = has_shape and all(problems.integer("shape", n, at_least=3) for n in shape)
-        has_spacing = problems.numbers("spacing", spacing, above=0, at_most=1e100) and problems.require(
+        has_spacing = problems.numbers("spacing", spacing, above=0, at_most=10.0**DECADES)
+        has_spacing = has_spacing and problems.require(
             float_array(spacing).size in (1, 2), "spacing", "one length or (dy, dx)", spacing
         )
         # without the boundary, which is checked above: here it may not be None
@@ -117,7 +118,7 @@ def _grid(shape: Any, spacing: Any, boundary: str) -> Grid:
     return Grid((int(shape[0]), int(shape[1])), pair, (periodic, periodic))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=4)  # each holds two planes
 def flat_block(body: Body) -> Solution:
     """Return the solution under a unit force: that of a contact whose gap at first touch is zero everywhere.
 
@@ -133,7 +134,7 @@ def flat_block(body: Body) -> Solution:
     return ConstrainedCG(system, Control(force=1.0), uniform).solve(1e-14)
 
 
-@lru_cache(maxsize=16)
+@lru_cache
 def uniform_compliance(body: Body) -> float:
     """Return the mean displacement under a uniform pressure that adds up to 1."""
     if body.periodic:

@@ -17,6 +17,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import in_bands
 
 SMALL = 128 * 128  # nodes up to which tables of the modes are kept, also for the next call
+KEPT = 32  # small bodies whose tables of each sort are kept, at most 8 MB
 NO_WORK: Array = np.empty(0)  # of a filter whose work is not asked for
 
 
@@ -230,7 +231,7 @@ def squared_wavenumbers(shape: tuple[int, int], spacing: tuple[float, float]) ->
     return qy2, fft.wavenumbers(shape[1], spacing[1], real=True) ** 2
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=KEPT)
 def wavenumber_weights(
     shape: tuple[int, int], spacing: tuple[float, float], factor: float, invert: bool, mean: float, char: str
 ) -> Array:

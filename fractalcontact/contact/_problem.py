@@ -20,7 +20,7 @@ from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import PAPER, joined_references
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
-from fractalcontact.contact._operator import SMALL, HalfSpaceOperator, Operator, PeriodicOperator
+from fractalcontact.contact._operator import KEPT, SMALL, HalfSpaceOperator, Operator, PeriodicOperator
 
 BOUNDARIES = ("free", "periodic")
 INFLUENCES = ("disc", "square", "spectral")
@@ -374,7 +374,7 @@ class Solution:
     solver: str = "closed_form"  # or "elimination", or one of the three of `_window_solver`
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=KEPT)
 def kept_operator(body: Body) -> HalfSpaceOperator:
     """Return the operator of a small free body; its table takes as long as a solution."""
     return HalfSpaceOperator(body.influence_table())

@@ -26,7 +26,7 @@ import numpy as np
 
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
-from fractalcontact.contact._operator import HalfSpaceOperator, Operator, PairSum
+from fractalcontact.contact._operator import KEPT, HalfSpaceOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
 from fractalcontact.contact._problem import Body, Control, Problem, Solution
 
@@ -402,7 +402,7 @@ def pair_tables(body: Body) -> tuple[Array, Array]:
     return body.influence_table(), stiffness_table(body)
 
 
-kept_pair_tables = lru_cache(maxsize=16)(pair_tables)
+kept_pair_tables = lru_cache(maxsize=KEPT)(pair_tables)
 
 
 def first_precision(
