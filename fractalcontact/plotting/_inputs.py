@@ -43,7 +43,7 @@ def result_of(
     Raises
     ------
     InvalidInput
-        A variable is missing, or another path dim is longer than one.
+        A variable is missing, another path dim is longer than one, or a dim is the name of a variable.
     """
     dataset = shown_in(as_dataset(data, argument), units)
     require_variables(dataset, names, argument)
@@ -57,6 +57,9 @@ def result_of(
             problems.require(
                 dataset.sizes[dim] == 1, argument, f"one {dim}; choose with .sel or .isel", dataset.sizes[dim]
             )
+        for dim in set(dims).intersection(dataset.variables) - set(dataset.dims):
+            over = dataset[dim].dims  # a variable of this name, as the shear of `direct_shear` over points
+            problems.require(not over, argument, f"a result over {dim}", f"one with {dim} over {over}")
     dataset = dataset.isel(dict.fromkeys(extra, 0))
     return dataset.expand_dims([dim for dim in dims if dim not in dataset.dims])
 

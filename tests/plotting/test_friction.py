@@ -7,6 +7,7 @@ from plotting_figures import drawn, holds
 
 import fractalcontact as fc
 from fractalcontact import plotting
+from fractalcontact.base.errors import InvalidInput
 
 
 def test_angle_strength_and_basic_angle():
@@ -51,3 +52,12 @@ def test_rigid_friction_under_several_pressures():
         assert holds(drawn(strength), expected.shear, expected.shear_strength.isel(step=step))
     with pytest.raises(ValueError, match="one direction"):
         plotting.friction(rubbed)
+
+
+def test_friction_along_a_test_is_no_result_over_shear():
+    face = fc.surfaces.fbm((24, 24), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=1.6e-3)
+    test = fc.joints.direct_shear(crack, 2e-4, nominal_pressure=1e6, hardness=2e8)
+    for kind in ("friction", "dilatancy"):
+        with pytest.raises(InvalidInput, match="a result over shear, got one with shear over"):
+            plotting.plot(test, kind)
