@@ -98,7 +98,8 @@ def read(
         are y, or with points (two or three columns, `.xyz`, `.pts`), a mesh or cloud (`.ply`, `.stl`, `.obj`,
         `.las`; extra `mesh`), a raster (GeoTIFF, ESRI ASCII, Surfer; extra `geo`), an instrument's file
         (extra `io`), or one of these with `.gz`. `.npy` and tables of heights need `spacing`, `.npz` needs it
-        or arrays `x` and `y`; points are gridded by `from_points`.
+        or arrays `x` and `y`; points, in `.npy` an array of two or three columns too, are gridded by
+        `from_points`.
     channel : str or int, optional
         Channel of an instrument's file, variable of a NetCDF file, or band of a raster (from 0). Default:
         the first height channel.
@@ -285,7 +286,8 @@ def _archive_content(request: Request) -> FileContent:
     values = arrays[str(name)]
     axes = [arrays.get(dim, np.empty(0)) for dim in ("y", "x")]
     axes = [axis.ravel().astype(np.float64) if axis.dtype.kind in "iuf" else np.empty(0) for axis in axes]
-    if spacing is None and [axis.size for axis in axes] == list(values.shape[-2:]):
+    stated, shape = [axis.size for axis in axes], list(values.shape[-2:])
+    if spacing is None and stated == shape:
         steps = [np.diff(in_metres(axis, request.units or "m")) for axis in axes]
         with Problems(WHERE, UnreadableFile) as problems:
             for dim, step in zip(("y", "x"), steps, strict=True):
@@ -293,7 +295,13 @@ def _archive_content(request: Request) -> FileContent:
                 problems.require(is_even, dim, "evenly spaced coordinates", "uneven ones")
         values = values[..., :: int(np.sign(steps[0][0])), :: int(np.sign(steps[1][0]))]
         spacing = [float(abs(step).mean()) for step in steps]
-    return _array_content(values, replace(request, spacing=spacing))
+        return _heights_content(
+            values, replace(request, spacing=spacing)
+        )  # no points, of three columns either
+    with Problems(WHERE, UnreadableFile) as problems:
+        expected = f"dims (y, x), as of the arrays y and x {tuple(stated)}"
+        problems.require(spacing is not None or stated != shape[::-1], str(name), expected, tuple(shape))
+    return _array_content(values, request)
 
 
 def _array_content(values: Array, request: Request) -> FileContent:

@@ -528,6 +528,19 @@ def test_npz_that_cannot_be_a_surface(tmp_path, arrays, options, problem):
         fc.surfaces.read(tmp_path / "a.npz", **options)
 
 
+@pytest.mark.parametrize("shape", [(8, 3), (3, 8), (6, 2)])
+def test_narrow_map_of_an_npz_is_no_list_of_points(tmp_path, shape):
+    heights = 1e-4 * np.random.default_rng(1).random(shape)
+    y, x = (np.arange(n) * step for n, step in zip(shape, (2e-3, 1e-3), strict=True))
+    np.savez(tmp_path / "a.npz", height=heights, x=x, y=y)
+    surface = fc.surfaces.read(tmp_path / "a.npz")
+    np.testing.assert_array_equal(surface, heights)
+    assert float(surface.y[1] - surface.y[0]) == pytest.approx(2e-3)
+    np.savez(tmp_path / "a.npz", height=heights.T, x=x, y=y)
+    with pytest.raises(UnreadableFile, match=r"height: expected dims \(y, x\)"):
+        fc.surfaces.read(tmp_path / "a.npz")
+
+
 def test_damaged_npz(tmp_path):
     (tmp_path / "a.npz").write_bytes(b"PK" + bytes(100))
     with pytest.raises(UnreadableFile, match="corrupt"):
