@@ -286,14 +286,15 @@ class Problems:
         if not self.path(argument, value):
             return False
         what = "an existing file"
+        name = Path(value).name
         try:
-            is_file = Path(value).is_file()
+            is_file, is_folder = Path(value).is_file(), Path(value).is_dir()
         except OSError as error:  # a folder on the way may not be searched
-            return self.require(False, argument, what, Words(f"{Path(value).name!r}: {error.strerror}"))
-        if not self.require(is_file, argument, what, Path(value).name):
+            return self.require(False, argument, what, Words(f"{name!r}: {error.strerror}"))
+        if not self.require(is_file, argument, what, Words(f"the folder {name!r}") if is_folder else name):
             return False
         may_read = access(value, R_OK)
-        got = Words(f"{Path(value).name!r}: no permission to read it")
+        got = Words(f"{name!r}: no permission to read it")
         return self.require(may_read, argument, f"{what} that may be read", got)
 
     def surface(self, argument: str, value: Any = GIVEN, **options: Any) -> bool:

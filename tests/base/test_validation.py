@@ -165,3 +165,11 @@ def test_checks_read_the_arguments_of_the_call():
     assert [line.split(":")[0] for line in caught.value.problems] == ["lag", "method", "spacing"]
     assert "got -1.0" in caught.value.problems[0]
     assert "got [1.0, 2.0]" in caught.value.problems[2]
+
+
+def test_folder_in_place_of_a_file_is_named_one(tmp_path):
+    problems = Problems("here")
+    assert not problems.file("path", tmp_path)
+    assert problems.messages == [f"path: expected an existing file, got the folder {tmp_path.name!r}"]
+    assert not problems.file("path", tmp_path / "none.nc")
+    assert problems.messages[1] == "path: expected an existing file, got 'none.nc'"
