@@ -157,9 +157,10 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
         if kind is not None:
             problems.choice("kind", kind, KINDS)
     with Problems(where) as problems:
-        draw_kind: Drawing = KINDS[kind or _standard_kind(result)][0]
+        kind = kind or _standard_kind(result)
+        draw_kind: Drawing = KINDS[kind][0]
         for name in options:
-            problems.choice("options", name, list(inspect.signature(draw_kind).parameters)[1:])
+            problems.choice(f"options of {kind}", name, list(inspect.signature(draw_kind).parameters)[1:])
     with Problems(where):
         return draw_kind(result, **options)
 

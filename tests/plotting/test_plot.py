@@ -1,15 +1,12 @@
 """The standard figure of a result: found by its variables, with the options of its kind."""
 
-import inspect
-
 import pytest
-from calls import CALLS, closed, figure_name, pressed, result_of
+from calls import CALLS, closed, figure_kinds, figure_name, options_of, pressed, result_of
 from plotting_figures import figure_of
 
 import fractalcontact as fc
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.plotting._draw import KINDS
 
 LABELS = {
     "alluvial": ("normal force $F$ (N)", "cells in contact"),
@@ -37,21 +34,16 @@ def test_axes_say_what_is_drawn(kind):
         assert label.startswith(expected)
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS.keys() - set(NO_STANDARD)))
-def test_standard_figure_of_a_result(kind, monkeypatch):
+@pytest.mark.parametrize("kind", sorted(set(figure_kinds()) - set(NO_STANDARD)))
+def test_standard_figure_of_a_result(kind):
     """A result finds its own figure; the drawing itself is tested elsewhere."""
     result = next(iter(CALLS[figure_name(kind)]().values()))
     if kind == "contact_domains":
         result = result["state"]
     if kind == "scans":
         result = result.assign(status=("scan", ["complete"] * result.sizes["scan"]))
-
-    def same(result):
-        return kind
-
-    for name, (_, variables) in KINDS.items():
-        monkeypatch.setitem(KINDS, name, (same if name == kind else None, variables))
-    assert plotting.plot(result) == kind
+    assert options_of(result) == options_of(result, kind)
+    assert options_of(result)[0] == kind
 
 
 def test_array_is_drawn_as_a_map_or_along_its_path():
@@ -64,16 +56,16 @@ def test_array_is_drawn_as_a_map_or_along_its_path():
 def test_docstring_has_every_kind_and_its_options():
     """Kinds without a function of their own are described, with every option that they have."""
     text = plotting.plot.__doc__
-    for kind in KINDS.keys() - set(plotting.__all__):
+    for kind in set(figure_kinds()) - set(plotting.__all__):
         line = next(part for part in text.split("- ") if kind in part.partition(":")[0])
-        options = list(inspect.signature(KINDS[kind][0]).parameters)[1:]
+        options = options_of(closed(), kind)[1]
         assert all(f"`{name}`" in line for name in options if name not in ("units", "ax", "axes")), kind
 
 
 def test_wrong_calls_are_refused(study):
     with pytest.raises(InvalidInput, match=r"fc.plotting.plot: .*\n.*kind: .*mean 'contact_area'"):
         plotting.plot(closed(), "contact area")
-    with pytest.raises(InvalidInput, match="options: expected one of 'laws'.*got 'theory'"):
+    with pytest.raises(InvalidInput, match="options of closure: expected one of 'laws'.*got 'theory'"):
         plotting.plot(closed(), theory=closed())
     with pytest.raises(InvalidInput, match="result: expected a labelled result"):
         plotting.plot(3.0)

@@ -1,13 +1,12 @@
 """What every figure keeps to: it returns what it drew on, in the style in use, and pyplot shows it once."""
 
-import inspect
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 import xarray as xr
-from calls import CALLS, figure_name, function_of
+from calls import CALLS, figure_kinds, figure_name, function_of, options_of, overview
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
@@ -16,9 +15,8 @@ from plotting_figures import figure_of
 
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
-from fractalcontact.plotting._draw import KINDS
 
-FIGURES = list(KINDS)
+FIGURES = figure_kinds()
 
 
 def draw(name, **options):
@@ -33,8 +31,7 @@ def panels(drawn):
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_takes_axes(name):
-    parameters = inspect.signature(KINDS[name][0]).parameters
-    assert len({"ax", "axes"} & set(parameters)) == 1
+    assert len({"ax", "axes"} & set(options_of(overview(), name)[1])) == 1
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -50,7 +47,7 @@ def test_axes_are_returned_and_readable_in_a_dark_style(name):
     sheet = Figure(figsize=(12, 12))
     axes = sheet.subplots(4, 3, subplot_kw={"projection": "polar" if is_polar else None}).ravel()
     axes = axes[: panels(drawn).size]
-    is_single = "ax" in inspect.signature(KINDS[name][0]).parameters
+    is_single = "ax" in options_of(overview(), name)[1]
     again = draw(name, **({"ax": axes[0]} if is_single else {"axes": axes}))
     assert np.array_equal(panels(again), axes)
     assert plt.get_fignums() == []
