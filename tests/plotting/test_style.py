@@ -45,8 +45,8 @@ def test_axes_are_returned_and_readable_in_a_dark_style(name):
     plt.close("all")
     is_polar = panels(drawn)[0].name == "polar"
     sheet = Figure(figsize=(12, 12))
-    axes = sheet.subplots(4, 3, subplot_kw={"projection": "polar" if is_polar else None}).ravel()
-    axes = axes[: panels(drawn).size]
+    projection = {"projection": "polar" if is_polar else None}
+    axes = sheet.subplots(1, panels(drawn).size, squeeze=False, subplot_kw=projection).ravel()
     is_single = "ax" in options_of(overview(), name)[1]
     again = draw(name, **({"ax": axes[0]} if is_single else {"axes": axes}))
     assert np.array_equal(panels(again), axes)

@@ -106,8 +106,8 @@ def test_one_wrong_row_is_found_quickly(tmp_path, monkeypatch, header, spacing):
 
 
 def packed(path):
-    """Write five million zeros in few bytes, in the format of the name."""
-    zeros = np.zeros((2000, 2500))
+    """Write three million zeros in few bytes, in the format of the name."""
+    zeros = np.zeros((1500, 2000))
     if path.suffix == ".gz":
         content = io.BytesIO()
         np.save(content, zeros)
@@ -129,10 +129,10 @@ def packed(path):
 
 @pytest.mark.parametrize("name", ["a.npy.gz", "a.npz", "a.mat", "a.h5", "a.nc"])
 def test_file_that_fills_the_memory_is_refused(tmp_path, monkeypatch, name):
-    """7.8 MB unpacked to 5.6 GB; here the limit is a megabyte, and the file unpacks to 38."""
+    """7.8 MB unpacked to 5.6 GB; here the limit is a megabyte, and the file unpacks to 23."""
     path = packed(tmp_path / name)
     if name == "a.npy.gz":
-        assert fc.surfaces.read(path, spacing=1e-5).shape == (2000, 2500)
+        assert fc.surfaces.read(path, spacing=1e-5).shape == (1500, 2000)
     monkeypatch.setattr(resources, "SMALL_FILE", 1 << 20)
     with pytest.raises(UnreadableFile, match=r"expected at most \d+ MiB when unpacked") as caught:
         fc.surfaces.read(path, spacing=1e-5)
