@@ -211,11 +211,11 @@ def test_archive_that_states_more_than_it_has_is_refused(tmp_path):
     """The size that an archive states is compared with its length before anything is unpacked."""
     pytest.importorskip("SurfaceTopography")
     header = io.BytesIO()
-    zeros = np.broadcast_to(0.0, (1 << 13, 1 << 13))
+    zeros = np.broadcast_to(0.0, (1 << 13, (1 << 12) + 32))
     np.lib.format.write_array(header, zeros)
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("heights.npy", header.getvalue())
-    with pytest.raises(UnreadableFile, match="at most 256 MiB when unpacked, for its size, got 512 MiB"):
+    with pytest.raises(UnreadableFile, match="at most 256 MiB when unpacked, for its size, got 258 MiB"):
         fc.surfaces.read(tmp_path / "bomb.npz", spacing=1.0)
 
 

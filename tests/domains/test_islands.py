@@ -82,7 +82,11 @@ def columns(result, shift):
 
 @pytest.mark.parametrize(
     ("connectivity", "wraps"),
-    [(1, (False, False)), (2, (True, True)), (1, (False, True)), (2, (False, False))],
+    [
+        (1, (False, True)),
+        (2, (True, True)),
+        *(pytest.param(connectivity, (False, False), marks=pytest.mark.slow) for connectivity in (1, 2)),
+    ],
 )
 def test_bands_give_the_same_table(connectivity, wraps):
     """Without labels 2^22 cells are looked at at a time, here two bands; with labels the whole plane."""

@@ -89,8 +89,15 @@ def test_curves_match_a_sum_over_all_positions(wraps, has_gaps):
         assert float(result.lacunarity_ratio.sel(scale=scale)) == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize("half_axes", [(4.5, 4.5), (12.0, 3.0)])
-@pytest.mark.parametrize("count", [60, 250])
+@pytest.mark.parametrize(
+    ("half_axes", "count"),
+    [
+        ((4.5, 4.5), 60),
+        ((12.0, 3.0), 250),
+        pytest.param((4.5, 4.5), 250, marks=pytest.mark.slow),
+        pytest.param((12.0, 3.0), 60, marks=pytest.mark.slow),
+    ],
+)
 def test_random_spots_have_no_excess_and_no_clustering(half_axes, count):
     rng = np.random.default_rng(5)
     planes = [random_spots(512, count, half_axes, rng) for _ in range(6)]
@@ -196,8 +203,10 @@ def test_a_state_alone_sets_no_saturated_window():
             assert float(result.window_high) <= float(result.gap_size) * (1 + 1e-9) or result.signature_flag
 
 
-@pytest.mark.parametrize("coverage", [0.03, 0.06])
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    ("coverage", "seed"),
+    [(0.03, 1), (0.06, 2), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.03, 2), (0.06, 1)))],
+)
 def test_refinement_changes_no_number_of_a_resolved_surface(coverage, seed):
     """One band-limited surface at three grids: D within .02, gap 1 %, clustering 2 %, A2 3 %."""
     n = 1024

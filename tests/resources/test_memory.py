@@ -75,11 +75,11 @@ def joint(n, loads="[10.0, 100.0]"):
 
 
 FAST = {
-    "estimate 256": estimated(256),
     "press free 256": free(256),
     "domains 128": periodic(128, "[1e6, 1e7]", want=DOMAINS),
 }
 SLOW = {
+    "estimate 256": estimated(256),
     "press periodic 256": periodic(256),
     "press periodic 512": periodic(512),
     "press free 512": free(512),
