@@ -122,6 +122,9 @@ def path(
     names = (variable,) if isinstance(variable, str) else tuple(variable)
     given = () if against is None else (against,)
     data = result_of(result, (*names, *given), PATH, units)
+    found = dict.fromkeys(data[name].attrs.get("units", "1") for name in names)
+    with Problems("fc.plotting.path") as problems:
+        problems.require(len(found) == 1, "variable", "variables of one unit", ", ".join(found))
     dims, x, family = _paths.path_axis(data, against)
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)

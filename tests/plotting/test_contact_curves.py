@@ -95,6 +95,11 @@ def test_missing_variables_are_named(pressed):
         plotting.path(pressed, "mean_gap", against="pressure_class")
 
 
+def test_variables_of_several_units_are_refused(pressed):
+    with pytest.raises(InvalidInput, match="variable: expected variables of one unit, got m, 1"):
+        plotting.path(pressed, ["mean_gap", "contact_fraction"])
+
+
 def test_any_variables_against_shear_with_an_interval():
     shear = np.array([1e-4, 2e-4, 4e-4])
     path = xr.Dataset(
