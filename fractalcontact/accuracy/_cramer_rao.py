@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, is_within
 from fractalcontact.base.spectra import (
     aliased_line_power_law,
     aliased_power_law,
@@ -74,7 +74,7 @@ def band_bound(shape: tuple[int, int], low: float, high: float) -> float:
     wave = radial_wavenumber(shape, (1.0, 1.0))
     weights = np.broadcast_to(half_weights(shape[1]), wave.shape)
     length = np.divide(2.0 * np.pi, wave, out=np.zeros_like(wave), where=wave > 0)
-    inside = (length > 0) & (length >= low * (1 - 1e-9)) & (length <= high * (1 + 1e-9))
+    inside = (length > 0) & is_within(length, low, high)
     logs, weights = np.log(wave[inside]), weights[inside]
     spread = float(np.sum(weights * (logs - np.average(logs, weights=weights)) ** 2))
     # a mode has the power q^(-2 - 2 H): d ln power / dH = -2 ln q, and each is one real Gaussian number

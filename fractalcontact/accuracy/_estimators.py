@@ -24,7 +24,7 @@ from fractalcontact.base.netcdf import save
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.provenance import stamp
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import label
+from fractalcontact.base.schema import HURST_RANGE, label
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import NONE, Problems, word_tuple
@@ -58,7 +58,7 @@ def _check(problems: Problems) -> None:
     given = problems.given
     for name in ("blur", "noise", "marks"):
         problems.number(name, at_least=0.0)
-    problems.numbers("hurst", at_least=0.01, at_most=0.99)
+    problems.numbers("hurst", **HURST_RANGE)
     has_sizes = problems.numbers("sizes", at_least=16, integral=True)
     chosen = problems.choices("families", among=FAMILIES)
     if problems.choices("methods", among=dimensions.methods(), optional=True) and chosen:

@@ -229,5 +229,5 @@ def _line(path: Path, size: int) -> bytes:
     value = 0
     with path.open("rb") as file:
         while left := size - file.tell():
-            value = zlib.crc32(file.read(min(left, 1 << 20)), value)
+            value = zlib.crc32(file.read(min(left, 1 << 20)), value)  # 2^16 to 2^22: as fast
     return _MARK + f"{value:08x}\n".encode()

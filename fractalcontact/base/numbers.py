@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 Array = np.ndarray[Any, np.dtype[Any]]
+# lengths that differ by less are one length, so that a window given as a decimal loses no point
+ROUNDED = 1.0 + 1e-9
 
 
 def is_real(value: Any) -> bool:
@@ -59,6 +61,11 @@ def python_number(value: Any) -> Any:
     """Return one number of NumPy or xarray as one of Python, whose arithmetic does not overflow."""
     has_no_axes = getattr(value, "ndim", None) == 0 and getattr(value, "dtype", np.dtype("O")).kind in "iuf"
     return value.item() if has_no_axes and not np.ma.is_masked(value) else value
+
+
+def is_within(values: Any, low: Any, high: Any) -> Any:
+    """Return which values lie between two positive ends, but for rounding."""
+    return (values >= low / ROUNDED) & (values <= high * ROUNDED)
 
 
 def spread_indices(count: int, most: int) -> list[int]:

@@ -227,13 +227,20 @@ class RandomEffects:
     count: int
 
 
+def student_quantile(freedom: float, level: float = 0.95) -> float:
+    """Return the half-width of an interval of Student's t, in standard errors."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.5 + level / 2))
+
+
 def random_effects(values: ArrayLike, errors: ArrayLike = 0.0, level: float = 0.95) -> RandomEffects:
     """Return the random-effects mean of values with the standard errors of each, of those that are finite.
 
     Values without errors have the mean and the interval of Student. One value alone has the interval of its
     error, if it has one.
     """
-    from scipy.special import ndtri, stdtrit
+    from scipy.special import ndtri
 
     x, s = np.broadcast_arrays(np.asarray(values, dtype=float), np.asarray(errors, dtype=float))
     is_finite = np.isfinite(x) & np.isfinite(s)
@@ -252,7 +259,7 @@ def random_effects(values: ArrayLike, errors: ArrayLike = 0.0, level: float = 0.
     mean = float(weight @ x / weight.sum())
     # the q of Hartung and Knapp, at least 1: otherwise values that agree by chance have too short an interval
     q = max(1.0, float(weight @ (x - mean) ** 2) / (count - 1))
-    half = float(stdtrit(count - 1, 0.5 + level / 2) * np.sqrt(q / weight.sum()))
+    half = student_quantile(count - 1, level) * float(np.sqrt(q / weight.sum()))
     return RandomEffects(
         mean, mean - half, mean + half, float(np.sqrt(tau2)), within, tau2 / (tau2 + within**2), count
     )

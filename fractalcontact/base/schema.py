@@ -40,6 +40,9 @@ class Quantity:
 
 
 STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
+# exponents with which surfaces are made; the circulant embedding is positive at .001 and .999 as well, where
+# heights are nearly white noise, or a plane
+HURST_RANGE: dict[str, Any] = {"at_least": 0.01, "at_most": 0.99}
 DEFAULT_TOLERANCE = 1e-8  # of a contact; from 1e-5 on the area is that of the solution (page theory_contact)
 
 

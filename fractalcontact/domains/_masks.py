@@ -16,10 +16,10 @@ from typing import Any, TypeVar
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import Grid, periodic_axes, read_grid
+from fractalcontact.base.grid import UNIFORM, Grid, periodic_axes, read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array as Array
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import float_array, is_within
 from fractalcontact.base.resources import has_blocks, thread_count
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, in_cells
 from fractalcontact.base.validation import GIVEN, LARGEST_INTEGER, Problems
@@ -245,6 +245,7 @@ def _check_valid(problems: Problems, valid: Any, mask: xr.DataArray | None) -> b
     for dim in dims:
         if dim in mask.coords and dim in valid.coords:
             own, other = mask.coords[dim].values, valid.coords[dim].values
+            # of more than 6 centres both ends
             expected, got = (np.array2string(values, threshold=6) for values in (own, other))
             expected = f"that of the mask, {expected}"
             matches &= problems.require(_same_coordinates(own, other), f"valid.{dim}", expected, got)
@@ -256,7 +257,7 @@ def _same_coordinates(first: Array, second: Array) -> bool:
     if first.dtype.kind not in "iuf" or second.dtype.kind not in "iuf":
         return bool(np.array_equal(first, second))
     spacing = np.abs(np.diff(first)).min() if first.size > 1 else 0.0
-    return bool(np.all(np.abs(first - second) <= 1e-6 * spacing))
+    return bool(np.all(np.abs(first - second) <= UNIFORM * spacing))
 
 
 def plane_shape(mask: Any) -> tuple[int, int]:
@@ -392,8 +393,7 @@ def check_window(problems: Problems, *, has_mask: bool) -> None:
         grid = mask_grid(problems.given.mask)
         longest = min(grid.extent) / 2.0
         expected = f"from a cell, {max(grid.spacing):g} m, to half the extent, {longest:g} m"
-        inside = max(grid.spacing) * (1 - 1e-9) <= values[0] and values[1] <= longest * (1 + 1e-9)
-        problems.require(inside, "window", expected)
+        problems.require(bool(is_within(values, max(grid.spacing), longest).all()), "window", expected)
 
 
 def read_box_sizes(sizes: Any, default: Array) -> Array:

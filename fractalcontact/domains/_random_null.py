@@ -97,7 +97,7 @@ def count_covariance(cells: float, observed: float, areas: Array, contents: Sequ
     product = alone[:, None] * alone
     nested = many * (miss_probability(cells, observed, large) - product)
     apart = (many * few - many) * (miss_probability(cells, observed, small + large) - product)
-    limit = np.sqrt(boxes[:, None] * boxes) * 0.25
+    limit = np.sqrt(boxes[:, None] * boxes) * 0.25  # the greatest variance of empty or not
     of_full_boxes = np.clip(nested + apart, -limit, limit)
     if all(of.share.size == 1 for of in contents):
         return np.asarray(of_full_boxes)

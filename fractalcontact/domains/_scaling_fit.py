@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
+from fractalcontact.base.numbers import ROUNDED
+from fractalcontact.base.regression import student_quantile
 from fractalcontact.domains._masks import Array, Planes
 
 # of the local slopes, to either side of a dimension: of 130 sets of known dimension .923 of the intervals of
@@ -21,10 +22,10 @@ def default_sizes(shape: Sequence[int]) -> Array:
     """Return the products of 2 and 3 up to the geometric mean of the cell and the extent, at least up to 9.
 
     Two sizes at a ratio of 2 or 3 give a local slope at the ratios by which most self-similar sets are
-    built. No size exceeds the shorter side. `shape` has one length for each axis.
+    built; up to 9 there are 7. No size exceeds the shorter side. `shape` has one length for each axis.
     """
     extent = float(np.prod(shape)) ** (1.0 / len(shape))
-    largest = min(max(int(extent**0.5 + 1e-9), 9), *shape)
+    largest = min(max(int(extent**0.5 * ROUNDED), 9), *shape)
     powers = (2**i * 3**j for i in range(largest.bit_length()) for j in range(largest.bit_length()))
     return np.array(sorted(size for size in powers if size <= largest), np.int64)
 
@@ -149,7 +150,7 @@ def weighted_mean(
 
 def deviations_of_95_percent(sizes: Array) -> float:
     """Return how many standard deviations of the local slopes make 95 %: Student's t, of the sizes less 2."""
-    return float(stdtrit(max(sizes.size - 2, 1), 0.975))
+    return student_quantile(max(sizes.size - 2, 1))
 
 
 def ratio_slopes(sizes: Array, area: Array) -> tuple[Array, Array]:

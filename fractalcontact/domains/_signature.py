@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import Grid
-from fractalcontact.base.numbers import float_array
+from fractalcontact.base.numbers import ROUNDED, float_array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -198,7 +198,7 @@ def common_window(
     *,
     least_ratio: float = 4.0,  # between five surfaces D scattered by .041 at a ratio of 2, .031 at 4
     usual_share: int = 8,  # beyond L/8 the block jackknife covers half of the true spread
-    last_share: int = 4,
+    last_share: int = 4,  # 2 and 8 gave the same windows of 40 states of pressed surfaces
 ) -> tuple[float, float]:
     """Return the window (m) of states with these spots and gaps; where it does not fit, (nan, nan).
 
@@ -211,7 +211,7 @@ def common_window(
     low = max(FINEST * shortest, np.max(spots[open_states], initial=0.0))
     smallest_gap = np.nanmin(gaps[open_states], initial=np.inf)
     high = max(least_ratio * low, min(extent / usual_share, smallest_gap))
-    return (low, high) if high <= extent / last_share * (1 + 1e-9) else (np.nan, np.nan)
+    return (low, high) if high <= extent / last_share * ROUNDED else (np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -336,7 +336,7 @@ class Bracket:
         most = np.array(grid.shape) - further
         below, above = (
             np.clip(part, 1, np.maximum(most, 1)).astype(np.int64)
-            for part in (np.floor(cells * (1 + 1e-12)), np.ceil(cells * (1 - 1e-12)))
+            for part in (np.floor(cells * ROUNDED), np.ceil(cells / ROUNDED))
         )
         low, high = _sides(below, grid), _sides(above, grid)
         span = np.log(high / low)

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_direction, check_directions, read_direction, read_directions
-from fractalcontact.base.grid import UNIFORM, Grid, distinct, read_grid
+from fractalcontact.base.grid import DECADES, UNIFORM, Grid, distinct, read_grid
 from fractalcontact.base.numbers import Array, as_array, float_array
 from fractalcontact.base.provenance import plain
 from fractalcontact.base.tables import html_table
@@ -267,7 +267,7 @@ def _words(value: float | Pair, units: str) -> str:
 def _check_faces(problems: Problems, lower: Any, upper: Any, block: Any) -> Block | None:
     """Check faces and block; return the block in cells unless it is not valid."""
     expected = "one edge length or (y, x), in metres"
-    block_is_valid = _check_one_or_two(problems, "block", block, expected, above=0, at_most=1e100)
+    block_is_valid = _check_one_or_two(problems, "block", block, expected, above=0, at_most=10.0**DECADES)
     layout = None
     lower_is_valid = problems.surface("lower", lower, finite=False)
     if lower_is_valid and block_is_valid:

@@ -20,7 +20,7 @@ from fractalcontact.base.compass import (
     direction_coords,
     read_directions,
 )
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import ROUNDED, Array, float_array
 from fractalcontact.base.regression import detrended, rounding_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.study import PAPER
@@ -151,7 +151,7 @@ def _whole_cell_shears(crack: Crack, directions: Sequence[Direction], most: int 
     travel = min(layout.travel(towards.unit) for towards in directions)
     if math.isinf(travel):
         travel = 0.5 * min(n * s for n, s in zip(layout.face_cells, layout.spacing, strict=True))
-    cells = math.floor(travel / step * (1.0 + 1e-9))
+    cells = math.floor(travel / step * ROUNDED)
     if cells <= most:
         return np.arange(cells + 1) * step
     return np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1, cells, most)))]) * step

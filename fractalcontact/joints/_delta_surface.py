@@ -24,7 +24,7 @@ from fractalcontact.base.compass import (
 )
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import Array, float_array, is_within
 from fractalcontact.base.regression import fit_line, rounding_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.study import PAPER
@@ -383,7 +383,7 @@ def _dimensions(delta: xr.DataArray, windows: tuple[Window, Window], flat: bool)
 def _slope(scale: xr.DataArray, value: xr.DataArray, window: Window) -> float:
     """Return the slope of a straight line through the logarithms inside the window."""
     lengths = np.asarray(scale.values, dtype=float)
-    inside = (lengths >= window[0] * (1 - 1e-9)) & (lengths <= window[1] * (1 + 1e-9))
+    inside = is_within(lengths, *window)
     count = int(inside.sum())
     if count < 2:
         problem = f"window: expected at least two scales of the block, got {count} in {window}"

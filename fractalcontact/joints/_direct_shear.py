@@ -13,6 +13,7 @@ import xarray as xr
 
 from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning, warn
+from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.signals import track
@@ -58,7 +59,7 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
         problems.add("direction", expected, towards.name)
         return
     cells = turning_points / step
-    whole = bool((np.abs(cells - np.rint(cells)) <= 1e-6 * np.maximum(np.abs(cells), 1.0)).all())
+    whole = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
     expected = f"multiples of {step:g} m, the cells along {towards.name}: wear stays on the grid"
     if problems.require(whole, "path", expected, turning_points.tolist()):
         moves = bool((np.diff(np.rint(cells)) != 0).all())
@@ -69,7 +70,7 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
     for reach, unit in ((turning_points.max(), (y, x)), (-turning_points.min(), (-y, -x))):
         travel = crack.layout.travel(unit)
         expected = f"at most {travel:g} m this way, where the block meets the edge of the face"
-        problems.require(bool(reach <= travel + 1e-6 * step), "path", expected, float(reach))
+        problems.require(bool(reach <= travel + UNIFORM * step), "path", expected, float(reach))
 
 
 @public_result(

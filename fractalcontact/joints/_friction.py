@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.labelled import drop_unknown_coords
-from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.numbers import ROUNDED, Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
@@ -33,8 +33,6 @@ NOT_KNOWN = (
     "depends on the distance in a way that is not known: the shears resolve one only, or the faces lock"
 )
 ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
-# a window given as a decimal must not lose a point to rounding, nor one of two equally near points
-WINDOW_ROUNDING = 1.0 + 1e-9
 PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
 
 
@@ -68,7 +66,7 @@ def _check(problems: Problems) -> None:
     ascending = shears.size > 1 and bool((np.diff(shears) > 0).all())
     if problems.require(ascending, "dilatancy.shear", "at least two shears, ascending", shears):
         reach = float(np.ptp(shears))
-        short = not bounded or given.distance is None or float(given.distance) <= reach * WINDOW_ROUNDING
+        short = not bounded or given.distance is None or float(given.distance) <= reach * ROUNDED
         problems.require(short, "distance", f"at most the {reach:g} m that the shears cover")
 
 
@@ -232,7 +230,7 @@ def _secant_angles(lift: xr.DataArray, length: float) -> xr.DataArray:
     """
     shears = _shears(lift)
     candidates = length * 2.0 ** np.arange(-20, 21)  # a million times: more than any path of shears resolves
-    finest, reach = np.diff(shears).min() / WINDOW_ROUNDING, np.ptp(shears) * WINDOW_ROUNDING
+    finest, reach = np.diff(shears).min() / ROUNDED, np.ptp(shears) * ROUNDED
     candidates = candidates[(candidates == length) | ((candidates >= finest) & (candidates <= reach))]
     resolved = np.isfinite(secant_slopes(shears, shears[:, None], candidates)).any(axis=(1, 2))
     distances = candidates[resolved | (candidates == length)]
@@ -268,9 +266,9 @@ def secant_slopes(shears: Array, curves: Array, distances: Array) -> Array:
     steps = np.diff(shears)
     slopes = np.full((distances.size, *curves.shape), np.nan)
     for k, distance in enumerate(distances):
-        if distance * WINDOW_ROUNDING < steps.min():
+        if distance * ROUNDED < steps.min():
             continue
-        rounding = distance * (WINDOW_ROUNDING - 1.0)
+        rounding = distance * (ROUNDED - 1.0)
         for i, start in enumerate(shears):
             end = start + distance
             last = int(np.searchsorted(shears, end - rounding))  # the first shear at or beyond the end
@@ -394,7 +392,7 @@ def _fitted_slopes(x: Array, y: Array, window: float) -> tuple[Array, Array]:
     slopes, lengths = np.empty(y.shape), np.empty(x.shape)
     for index, centre in enumerate(x):
         distance = np.abs(x - centre)
-        inside = distance <= WINDOW_ROUNDING * max(0.5 * window, np.sort(distance)[1])
+        inside = distance <= ROUNDED * max(0.5 * window, np.sort(distance)[1])
         offset = x[inside] - x[inside].mean()
         slopes[index] = offset @ (y[inside] - y[index]) / (offset @ offset)
         lengths[index] = np.ptp(x[inside])

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import Direction, check_directions, direction_coords, read_directions
-from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.grid import DECADES, core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import ROUNDING, detrended, rounding_of, slopes
 from fractalcontact.base.results import public_result
@@ -55,9 +55,9 @@ REFERENCES = (
 def _check(problems: Problems) -> None:
     given = problems.given
     directions_are_valid = given.direction is None or check_directions(problems)
-    lag_is_valid = problems.number("lag", above=0, at_most=1e100, optional=True)
+    lag_is_valid = problems.number("lag", above=0, at_most=10.0**DECADES, optional=True)
     lag_is_valid = problems.choice("regression", among=REGRESSIONS) and lag_is_valid
-    problems.number("length", at_least=SAMPLE_LENGTH, at_most=1e100, optional=True)
+    problems.number("length", at_least=SAMPLE_LENGTH, at_most=10.0**DECADES, optional=True)
     if not problems.surface("surface", finite=False, profile=True):
         return
     is_observed = bool(np.isfinite(given.surface.values).any())
@@ -474,4 +474,4 @@ def _fitted_shape(remainder: Array, share: Array, largest: float = 1e6) -> float
     high = 1.0
     while derivative(high) < 0.0 and high < largest:
         high *= 2.0
-    return float(brentq(derivative, 0.0, high, xtol=1e-12)) if derivative(high) > 0.0 else high
+    return float(brentq(derivative, 0.0, high)) if derivative(high) > 0.0 else high

@@ -16,6 +16,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _flow_network
+from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._flow_network import Held, Network
 from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
 
@@ -31,7 +32,7 @@ BOUNDS: dict[str, dict[str, Any]] = {
     "drain_diameter": {"at_least": 0},
     "drain_share": {"at_least": 0, "at_most": 1},
     "normal_stiffness": {"at_least": 1e3, "optional": True},  # Pa/m: softer joints open by metres
-    "total_stress": {"at_least": 1e-30, "at_most": LARGEST, "optional": True},
+    "total_stress": {"at_least": POSITIVE["at_least"], "at_most": LARGEST, "optional": True},
 }
 
 FORCES = ("uplift_force", "mean_uplift", "uplift_arm", "uplift_x", "uplift_y", "uplift_profile")

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import Direction
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import ROUNDED, Array
 from fractalcontact.joints._delta_surface import heights_under
 from fractalcontact.joints._sheared_contact import Pressing, ShearedContact
 
@@ -60,7 +60,7 @@ class WornJoint:
         lower, upper = crack.faces()
         self.crack, self.towards, self.pressing = crack, towards, pressing
         # just below the hardness all over; 1 - 1e-6 and 1 - 1e-12 gave the same bits
-        self.capacity = (1.0 - 1e-9) * float(options.hardness or math.inf) * crack.nominal_area
+        self.capacity = float(options.hardness or math.inf) * crack.nominal_area / ROUNDED
         self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
         self.residual, self.steepest, self.plastic_work = 0.0, 0.0, 0.0
         self.unconverged = 0

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import is_within
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import StudyFigure, figure
@@ -151,7 +152,7 @@ def _draw_fit(above: LinePanel, below: LinePanel, fit: xr.Dataset, names: tuple[
     for panel in (above, below):
         panel.ax.axvspan(*panel.x.scale(window), color=_style.pale(), alpha=0.55, lw=0, zorder=0)
     x, y = above.x.values, above.y.values
-    inside = (x >= window[0] * (1 - 1e-9)) & (x <= window[1] * (1 + 1e-9)) & (x > 0) & (y > 0)
+    inside = is_within(x, *window) & (x > 0) & (y > 0)
     hurst, dimension = float(fit["hurst"]), float(fit["fractal_dimension"])
     if not inside.any() or not np.isfinite(hurst):
         return

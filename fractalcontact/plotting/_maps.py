@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import ROUNDED
 from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
@@ -225,7 +226,7 @@ def round_length(length: float) -> float:
     if not length > 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(length))
-    return float(power * max(m for m in (1, 2, 5) if m * power <= length * (1 + 1e-9)))
+    return float(power * max(m for m in (1, 2, 5) if m * power <= length * ROUNDED))
 
 
 def plane_of(data: Any, name: str, units: Units | None = None, argument: str = "result") -> xr.DataArray:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import spread_indices
+from fractalcontact.base.numbers import ROUNDED, spread_indices
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import Drawing
@@ -217,7 +217,7 @@ def limit_shear(data: xr.Dataset, reach: float | None) -> xr.Dataset:
     """Return the part of a result up to the shear `reach` (None: everything)."""
     if reach is None or "shear" not in data.dims:
         return data
-    return data.isel(shear=np.flatnonzero(data["shear"].values <= reach * (1 + 1e-9)))
+    return data.isel(shear=np.flatnonzero(data["shear"].values <= reach * ROUNDED))
 
 
 def by_direction(data: xr.Dataset) -> Family:

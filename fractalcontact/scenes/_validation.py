@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory, warn
-from fractalcontact.base.grid import distinct, plane_coords, read_grid
+from fractalcontact.base.grid import UNIFORM, distinct, plane_coords, read_grid
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.resources import require_memory
 from fractalcontact.base.schema import label
@@ -274,7 +274,7 @@ def _validate_travel(crack: Crack, stage: Stage, scene: Scene, problems: Problem
     longest = float(np.max(options["shear"]))
     for direction in directions if isinstance(directions, (list, tuple)) else [directions]:
         travel = crack.travel(direction)
-        if longest > travel * (1.0 + 1e-6):
+        if longest > travel * (1.0 + UNIFORM):
             problems.add(f"{stage.name}: shear", f"at most {travel:g} m towards {direction}", longest)
 
 

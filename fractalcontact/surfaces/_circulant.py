@@ -17,7 +17,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.errors import FractalContactError
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import ROUNDED, Array
 
 # numbers processed at a time, so that they stay in the processor cache; a surface of 1024 x 1024 points takes
 # as long with twice as many, and 2 and 8 % more with a half and a quarter
@@ -155,7 +155,7 @@ def _side(n: int, step: float, radius: float) -> int:
     """Return an even number of points, fast to transform, that covers the extent and one radius."""
     if n == 1:
         return 1
-    needed = int(np.ceil(radius / step * (1.0 - 1e-12))) + n - 1
+    needed = int(np.ceil(radius / step / ROUNDED)) + n - 1
     return 2 * fft.fast_length((needed + 1) // 2)
 
 

@@ -12,6 +12,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
+from fractalcontact.base.schema import HURST_RANGE
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _from_array
 from fractalcontact.surfaces._circulant import draw, embed, torus_shape
@@ -24,7 +25,7 @@ STEIN = (
 
 def _check(problems: Problems) -> None:
     _from_array.check_axes(problems)
-    problems.number("hurst", at_least=0.01, at_most=0.99)
+    problems.number("hurst", **HURST_RANGE)
     _from_array.check_length(problems, "rms_increment")
     _from_array.check_length(problems, "lag", optional=True)
     _from_array.check_ensemble(problems)

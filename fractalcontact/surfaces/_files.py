@@ -42,6 +42,7 @@ def open_bytes(path: Path) -> IO[bytes]:
         return path.open("rb")
     limit = unpacked_limit(path.stat().st_size, RATIO)
     content = io.BytesIO()
+    # in blocks, so that no more is unpacked than the limit and one of them
     with corrupt_named(path.name), gzip.open(path) as file:
         while content.tell() <= limit and (block := file.read(1 << 22)):
             content.write(block)

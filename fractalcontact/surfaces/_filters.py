@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, is_within
 from fractalcontact.base.regression import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -85,8 +85,7 @@ def _check_cutoff(problems: Problems) -> None:
         # a shorter kernel has too few points for its transmission: see the achieved error
         least, most = 4 * max(grid.spacing), max(grid.extent)
         expected = f"{least:.3g} m (four spacings) to {most:.3g} m (the extent)"
-        is_inside = least * (1 - 1e-9) <= float(given.cutoff) <= most * (1 + 1e-9)
-        problems.require(is_inside, "cutoff", expected)
+        problems.require(is_within(float(given.cutoff), least, most), "cutoff", expected)
 
 
 @public_result(

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.grid import DECADES
 from fractalcontact.base.numbers import Array, as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.study import provenance_of
@@ -29,8 +30,9 @@ def check_points(problems: Problems) -> bool:
     least = values.shape[1] + 1
     if not problems.require(len(finite) >= least, "points", f"at least {least} points", len(finite) or NONE):
         return False
-    size = float(np.abs(finite).max())  # m: its square can be represented
-    return problems.require(size <= 1e100, "points", "coordinates of at most 1e+100", size)
+    size = float(np.abs(finite).max())
+    expected = f"coordinates of at most 1e+{DECADES}"
+    return problems.require(size <= 10.0**DECADES, "points", expected, size)
 
 
 def point_array(points: Any) -> Array | None:

@@ -399,7 +399,7 @@ def _step(spacing: float | None, mean_distance: float, distance: float) -> float
     """Return the spacing of the cells: as asked for, or the mean distance of points with two digits."""
     if spacing is None:
         return float(f"{mean_distance:.1e}")
-    least = 0.1 * distance
+    least = 0.1 * distance  # finer cells are interpolated, 99 of 100
     if spacing < least:
         expected = f"at least {least:.2g} m, a tenth of the distance of the points"
         raise InvalidInput(WHERE, [f"spacing: expected {expected}, got {float(spacing):g}"])

@@ -94,10 +94,10 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
 
     Lists of points are read here: its own reader tries 600 times to skip rows, 40 s for 512 x 512 points.
     """
-    from SurfaceTopography.IO import open_topography, readers
+    from SurfaceTopography.IO import MAGIC_BUFFER_SIZE, open_topography, readers
     from SurfaceTopography.IO.Reader import MagicMatch
 
-    head, suffix = file.read(4096), _files.file_suffix(path).lstrip(".")
+    head, suffix = file.read(MAGIC_BUFFER_SIZE), _files.file_suffix(path).lstrip(".")
     reasons, tried = [], 0
     for reader in readers:
         is_list = reader.format() == POINTS and not head.startswith(PROFILERS)

@@ -13,6 +13,7 @@ import xarray as xr
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
+from fractalcontact.base.schema import HURST_RANGE
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _from_array
 
@@ -27,7 +28,7 @@ Points = Sequence[tuple[float, float]]
 
 def _check(problems: Problems) -> None:
     _from_array.check_axes(problems, profile=False)
-    problems.number("hurst", at_least=0.01, at_most=0.99)
+    problems.number("hurst", **HURST_RANGE)
     _from_array.check_length(problems, "rms_increment")
     _from_array.check_ensemble(problems)
 

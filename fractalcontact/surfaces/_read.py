@@ -14,7 +14,7 @@ import xarray as xr
 
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile, warn
-from fractalcontact.base.grid import METRES, core_dims, plane_coords, read_grid
+from fractalcontact.base.grid import METRES, UNIFORM, core_dims, plane_coords, read_grid
 from fractalcontact.base.labelled import usual_form
 from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.provenance import file_checksum
@@ -184,7 +184,7 @@ def file_content(request: Request) -> FileContent:
     if suffix == ".npz":
         return _archive_content(request)
     with _files.open_bytes(path) as file:
-        head = file.read(8)
+        head = file.read(8)  # the longest of the signatures
     if not head:
         raise UnreadableFile(WHERE, [f"path: expected data, got the empty file {path.name!r}"])
     if head.startswith(RASTERS):
@@ -291,7 +291,7 @@ def _archive_content(request: Request) -> FileContent:
         steps = [np.diff(in_metres(axis, request.units or "m")) for axis in axes]
         with Problems(WHERE, UnreadableFile) as problems:
             for dim, step in zip(("y", "x"), steps, strict=True):
-                is_even = bool(np.ptp(step) <= 1e-6 * abs(step[0])) and step[0] != 0
+                is_even = bool(np.ptp(step) <= UNIFORM * abs(step[0])) and step[0] != 0
                 problems.require(is_even, dim, "evenly spaced coordinates", "uneven ones")
         values = values[..., :: int(np.sign(steps[0][0])), :: int(np.sign(steps[1][0]))]
         spacing = [float(abs(step).mean()) for step in steps]
@@ -379,6 +379,7 @@ def _warn_of_scale(content: FileContent, name: str) -> None:
         faults.append(f"the field is {widest:g} m wide, more than any microscope has")
     observed = heights[np.isfinite(heights)]
     relief = float(observed.max() - observed.min()) / widest if observed.size else 0.0
+    # four files of instruments have .02 to .27, a fifth one in a wrong unit 2e-8
     if relief > 0 and not 1e-6 <= relief <= 10.0:
         faults.append(
             f"heights span {relief:.1g} of the extent of {widest:.3g} m, a ratio outside 1e-06 ... 10"

@@ -274,6 +274,7 @@ def _check_las_size(file: IO[bytes], path: Path) -> None:
     """
     import laspy
 
+    # places in the header (ASPRS, LAS 1.4 R15)
     size = file.seek(0, io.SEEK_END)
     counts = {"records": _unpacked("<I", file, 100)}
     if _unpacked("<BB", file, 24) >= (1, 4):

@@ -173,7 +173,7 @@ def _bessel_integral(power: float, start: Array, near: float = 6.0, far: float =
     factor = 1.0
     for k in range(40):  # power series of J0, of which 20 terms give the same to rounding
         exponent = power + 2 * k + 1.0
-        if abs(exponent) < 1e-12:
+        if abs(exponent) < 1e-12:  # 1e-15 and 1e-9 gave the same bits
             term = np.log(near / first)
         else:
             term = (near**exponent - first**exponent) / exponent
@@ -198,5 +198,5 @@ def _power_integral(power: float, low: float, high: float) -> float:
     """Return the integral of q^power from low to high, without loss as power nears -1."""
     exponent = power + 1.0
     span = np.log(high / low)
-    growth = span if abs(exponent * span) < 1e-300 else np.expm1(exponent * span) / exponent
+    growth = span if exponent == 0.0 else np.expm1(exponent * span) / exponent
     return float(low**exponent * growth)

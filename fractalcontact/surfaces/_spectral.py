@@ -12,9 +12,10 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.compass import check_direction, read_direction
-from fractalcontact.base.numbers import Array, float_array, power_of_two
+from fractalcontact.base.numbers import ROUNDED, Array, float_array, power_of_two
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
+from fractalcontact.base.schema import HURST_RANGE
 from fractalcontact.base.spectra import half_wavenumbers, half_weights
 from fractalcontact.base.validation import NONE, Problems, given_option
 from fractalcontact.surfaces import _from_array
@@ -27,14 +28,15 @@ JACOBS = (
 # modes drawn at a time, which bounds the memory; their order depends on it. 2^13 to 2^20 take the same time
 # within a tenth for 1024 x 1024 points
 BLOCK = 1 << 15
-EDGE = 1e-9  # relative distance from a cut-off within which a mode counts as inside
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
     valid_plane = _from_array.check_axes(problems)
     axes = np.size(given.shape) if valid_plane else 2
-    valid_hurst = problems.numbers("hurst", at_least=0.01, at_most=1.0) and problems.require(
+    valid_hurst = problems.numbers(
+        "hurst", at_least=HURST_RANGE["at_least"], at_most=1.0
+    ) and problems.require(
         np.size(given.hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else "")
     )
     problems.exactly_one(rms_height=given.rms_height, rms_slope=given.rms_slope)
@@ -46,6 +48,7 @@ def _check(problems: Problems) -> None:
         _check_order(problems)
     problems.choice("normalise", among=("realisation", "expectation"))
     check_direction(problems)
+    # beyond the ratio of extent to spacing of any grid
     if problems.number("anisotropy_ratio", at_least=1e-6, at_most=1e6):
         one_exponent = not valid_hurst or len(set(float_array(given.hurst))) == 1
         isotropic = float(given.anisotropy_ratio) == 1.0
@@ -71,12 +74,12 @@ def _check_order(problems: Problems) -> None:
     if given.short_cutoff is not None:
         least = 2.0 * min(steps)
         expected = f"at least two spacings, {least:g} m"
-        problems.require(shortest >= least * (1.0 - 1e-9), "short_cutoff", expected, shortest)
+        problems.require(shortest * ROUNDED >= least, "short_cutoff", expected, shortest)
     if given.rolloff is not None:
         expected = f"at most long_cutoff, {longest:g} m"
-        problems.require(corner <= longest * (1.0 + 1e-9), "rolloff", expected, corner)
+        problems.require(corner <= longest * ROUNDED, "rolloff", expected, corner)
     expected = f"at most the roll-off, {corner:g} m"
-    problems.require(shortest <= corner * (1.0 + 1e-9), "short_cutoff", expected, shortest)
+    problems.require(shortest <= corner * ROUNDED, "short_cutoff", expected, shortest)
 
 
 @public_result(
@@ -289,9 +292,9 @@ class _Band:
         square = self._square(qy, qx)
         outside = square == 0.0
         if self.low > 0.0:
-            outside |= square < (self.low * (1.0 - EDGE)) ** 2
+            outside |= square < (self.low / ROUNDED) ** 2
         if np.isfinite(self.high):
-            outside |= square > (self.high * (1.0 + EDGE)) ** 2
+            outside |= square > (self.high * ROUNDED) ** 2
         square *= self.corner**-2.0
         np.maximum(square, 1.0, out=square)
         amplitude = np.power(square, -0.5 * (0.5 * self.axes + self.mean_hurst), out=square)
@@ -319,7 +322,9 @@ class _Band:
         if self.anisotropy_ratio == 1.0:
             return amplitude
         mirrored = self.amplitude(-qy, qx)
-        is_nyquist = np.isclose(np.abs(qy), nyquist[0], rtol=1e-9) | np.isclose(qx, nyquist[1], rtol=1e-9)
+        is_nyquist = np.isclose(np.abs(qy), nyquist[0], ROUNDED - 1.0) | np.isclose(
+            qx, nyquist[1], ROUNDED - 1.0
+        )
         return np.where(is_nyquist, np.sqrt(0.5 * (amplitude**2 + mirrored**2)), amplitude)
 
 
@@ -415,6 +420,6 @@ def _reach(band: _Band, waves_y: Array, waves_x: Array) -> tuple[int, int]:
     """Return the number of rows (from either end) and of columns that can have modes inside the band."""
     if not np.isfinite(band.high) or band.anisotropy_ratio != 1.0 or band.hurst[0] != band.hurst[1]:
         return waves_y.size // 2 + 1, waves_x.size
-    high = band.high * (1.0 + EDGE)
+    high = band.high * ROUNDED
     rows = np.count_nonzero(np.abs(waves_y[: waves_y.size // 2 + 1]) <= high)
     return int(rows), int(np.count_nonzero(waves_x <= high))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import ROUNDED, Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
@@ -101,7 +101,7 @@ def weierstrass(
     """
     sizes, steps = _from_array.sizes_and_steps(shape, spacing)
     extent = max(n * step for n, step in zip(sizes, steps, strict=True))
-    wavelengths = 1 + int(math.log(extent / (2.0 * max(steps))) / math.log(float(ratio)) * (1.0 + 1e-12))
+    wavelengths = 1 + int(math.log(extent / (2.0 * max(steps))) / math.log(float(ratio)) * ROUNDED)
     directions = int(ridges) if len(sizes) == 2 else 1
     axes = [2.0 * math.pi * step / extent * np.arange(n) for n, step in zip(sizes, steps, strict=True)]
 
