@@ -25,7 +25,7 @@ def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, al
     Gaussian blur of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer
     function is above one half. Without `aliases` the density is the power law itself.
     """
-    low, high = max(hurst - BOUND_STEP, 1e-6), hurst + BOUND_STEP
+    low, high = hurst - BOUND_STEP, hurst + BOUND_STEP
     w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi
     lower, upper = (
         aliased_power_law((w[:, None], w), each) if axes == 2 else aliased_line_power_law(w, each)
@@ -52,7 +52,7 @@ def rolloff_bound(hurst: float, n: int, corner: float, blur: float = 0.0) -> flo
         return np.asarray(np.log(aliased_power_law((w[:, None], w), exponent) + rolled.sum(axis=(0, 1))))
 
     step = BOUND_STEP
-    low, high = max(hurst - step, 1e-6), hurst + step
+    low, high = hurst - step, hurst + step
     slope = (logs(high, corner) - logs(low, corner)) / (high - low)
     bend = logs(hurst, corner * (1.0 + step)) - logs(hurst, corner)
     inside = blur**2 * (w[:, None] ** 2 + w**2) < np.log(2.0)

@@ -259,7 +259,7 @@ def _surfaces(
     """Return surfaces of a family; free ones are made with a margin, blurred, and get noise and marks."""
     if not family.is_free:
         return family.make(hurst, n, 0, count, stream)
-    margin = int(np.ceil(5.0 * defects["blur"]))
+    margin = int(np.ceil(5.0 * defects["blur"]))  # the Gaussian filter of SciPy ends at 4 spreads
     return _with_defects(family.make(hurst, n, margin, count, stream), n, margin, defects, stream)
 
 

@@ -122,5 +122,6 @@ def _estimators_summary(bench: xr.Dataset) -> str:
 
 
 def _estimator_cell(bias: float, ratio: float, coverage: float) -> str:
+    # three digits
     ratio_text = f"{ratio:.2f}" if ratio < 9.995 else f"{ratio:.0f}"
     return f"{bias:+.3f} {ratio_text} {f'{coverage:.3f}' if np.isfinite(coverage) else 'none'}"

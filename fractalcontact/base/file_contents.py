@@ -186,6 +186,7 @@ def _variable_lines(group: Header) -> Iterable[str]:
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for name, dims, words in rows:
         line = f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
+        # 6 blanks between the columns, but no more than half a line
         yield from _wrapped(line, min(6 + widths[0] + widths[1], screen_width() // 2))
 
 

@@ -5,6 +5,7 @@ Nothing here needs NumPy, so that the command starts fast.
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import sys
@@ -70,7 +71,7 @@ def output_folder(out: str | os.PathLike[str]) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         clear_partial(out)
         if not os.access(out, os.W_OK):
-            raise PermissionError(13, "no permission to write")
+            raise PermissionError(errno.EACCES, "no permission to write")
     except OSError as error:
         raise InvalidInput(
             WHERE, [f"out: expected a folder to write in, got {out.name!r}: {error.strerror}"]

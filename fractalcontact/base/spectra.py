@@ -107,6 +107,7 @@ def ring_edges(shape: Sequence[int], spacing: Sequence[float]) -> Array:
     """Return the edges of the rings of `radial_average`, in rad m-1."""
     finer, step = sorted(2.0 * np.pi / (n * s) for n, s in zip(shape, spacing, strict=True))
     edges = step * (np.arange(int(np.floor(np.pi / max(spacing) / step + 0.5)) + 1) + 0.5)
+    # rounding must not make one more: 1e-12 and 1e-6 gave the same edges
     low = finer * (np.arange(int(np.ceil(0.5 * step / finer - 0.5 - 1e-9))) + 0.5)
     return np.concatenate([low, edges])
 
@@ -252,6 +253,7 @@ def aliased_power_law(
     hurst : float
         Above 0.
     images : int
+        3 change the density by up to 2.6 % (cells of 1 by 3, H of .05 to .95), 10 by .7 %, 40 by .8 %.
     spacing : (dy, dx)
     """
     step_y, step_x = (2.0 * np.pi / length for length in spacing)
@@ -260,7 +262,7 @@ def aliased_power_law(
     for dy in step_y * offsets:
         for dx in step_x * offsets:
             total = total + ((waves[0] + dy) ** 2 + (waves[1] + dx) ** 2) ** (-1.0 - hurst)
-    angle = (np.arange(2000) + 0.5) / 2000 * np.pi
+    angle = (np.arange(2000) + 0.5) / 2000 * np.pi  # 200 change the density by 3e-6, 20000 by 1e-8
     sides = np.maximum(np.abs(np.sin(angle)) / step_y, np.abs(np.cos(angle)) / step_x)
     radius = (images + 0.5) / sides
     tail = np.mean(radius ** (-2.0 * hurst)) / (2.0 * hurst) * (2.0 * np.pi) / (step_y * step_x)

@@ -168,7 +168,7 @@ def number(value: float, digits: int = 3) -> str:
     ('1230000', '0', '0.123', '2.5e-09')
     """
     text = f"{value:.{digits}g}"
-    if "e" in text and 1e-4 <= abs(value) < 1e7:
+    if "e" in text and 1e-4 <= abs(value) < 1e7:  # up to 7 digits are read more easily than a power
         text = f"{float(text):.0f}"
     return "0" if text == "-0" else text
 

@@ -410,4 +410,4 @@ def _shown(value: object) -> str:
     except Exception:  # more than 4300 digits, lists nested too deeply, an object that cannot be shown
         return f"a value of type {type(value).__name__} that cannot be shown"
     text = " ".join(text.encode("utf-8", "backslashreplace").decode().split())
-    return text if len(text) <= 120 else text[:117] + "..."
+    return text if len(text) <= 120 else text[:117] + "..."  # about a line

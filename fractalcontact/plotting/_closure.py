@@ -99,7 +99,7 @@ def _draw_laws(result: Any, laws: Any, key: bool, log: bool, units: Units | None
         shown = pressure[i][np.isfinite(points[i]) & (pressure[i] > seat)]
         if shown.size < 2:
             continue
-        p = np.geomspace(shown.min(), shown.max(), 200)
+        p = np.geomspace(shown.min(), shown.max(), 200)  # about 1/72 inch each
         length, reference, stiffness, greatest = (values[i] for values in constants)
         with np.errstate(all="ignore"):  # constants of faces that close by rounding alone
             curves = (length * np.log(p / reference), (p - seat) / (stiffness + (p - seat) / greatest))

@@ -183,7 +183,7 @@ def pressure_distribution(
         density = share[i] * classes.size / greatest[i]
         panel.line(family.curve("this surface", i), pressure, density, drawstyle="steps-mid", lw=1.0, **own)
         if spread:
-            beside = np.linspace(0.0, float(pressure[-1]), 400)
+            beside = np.linspace(0.0, float(pressure[-1]), 400)  # below 1/72 inch each
             theirs = _persson(beside, nominal[i], spread)
             panel.line(family.curve("Persson", i), beside, theirs, **own, **_style.DASH_DOTTED)
     if spread:

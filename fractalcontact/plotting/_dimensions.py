@@ -138,7 +138,7 @@ def _slope_limits(ax: Axes, slopes: Any, clipped: float = 10.0) -> None:
     finite = slopes[np.isfinite(slopes)]
     if finite.size:
         low, high = np.percentile(finite, (clipped, 100 - clipped))
-        margin = max(0.4 * (high - low), 0.05)
+        margin = max(0.4 * (high - low), 0.05)  # an axis of a tenth at least
         ax.set_ylim(low - margin, high + margin)
 
 

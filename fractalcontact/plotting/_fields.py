@@ -54,7 +54,7 @@ def contact_domains(
     rows = -(-count // columns)
     has_legend = name == "slip_state" or bool((state > 1).any())
     left, right, bottom, top = extent_of(state)
-    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)
+    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)  # narrower maps would have no room for words
     height = 0.5 + rows * (shape * (width / columns - 0.15) + 0.28) + 0.25 * has_legend
     size = (max(width, 3.0), height)
     zooms: Any

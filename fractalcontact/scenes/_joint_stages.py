@@ -84,7 +84,7 @@ def _greatest_shear(state: xr.Dataset) -> Any:
 
 def _mean_slope(state: xr.Dataset) -> str | None:
     """Return the slope of the mean plane; None of a face that is level to the digits shown."""
-    is_shown = "mean_slope" in state and float(abs(state["mean_slope"]).max()) >= 0.5e-4
+    is_shown = "mean_slope" in state and float(abs(state["mean_slope"]).max()) >= 0.5e-4  # four decimals
     return plain(state["mean_slope"], 4, sign=True) if is_shown else None
 
 

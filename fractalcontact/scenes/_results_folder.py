@@ -311,6 +311,7 @@ def with_seeds(scene: Scene, store: PartStore) -> Scene:
     key = f"seeds.{digest_of(scene.tables)}"
     kept = store.get(key)
     if kept is None:
+        # short, and unlike that of any other study
         kept = xr.Dataset(attrs={name: str(secrets.randbits(48)) for name in names})
         store.put(key, kept)
     tables = {name: {**scene.table(name), "rng": int(kept.attrs[name])} for name in names}

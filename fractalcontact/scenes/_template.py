@@ -268,13 +268,14 @@ def _loads(facts: Mapping[str, Any], young: Any, poisson: float) -> dict[str, An
     """Return the ends of the path of the load on a flat: true contact of a thousandth and of a fifth."""
     # a fraction of true contact needs about half of it times modulus and rms slope (Bush; Persson)
     modulus = 0.5 * float(young) / (1.0 - poisson**2)
-    unit = 0.5 * modulus * max(facts["slope"], 1e-12)
+    unit = 0.5 * modulus * max(facts["slope"], 1e-12)  # of a flat surface: above 0
     return {"first": _rounded(1e-3 * unit), "last": _rounded(0.2 * unit)}
 
 
 def _travel(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Return the block of a joint, its shears, and the range of its travel."""
     step = facts["spacing"]
+    # a block in the middle can slide by .2 of the extent either way, farther than .15
     block = step * math.floor(0.6 * facts["extent"] / step)
     farthest = step * math.floor(0.15 * facts["extent"] / step)
     shears = [0.0, *(_rounded(step * max(1, round(share * farthest / step))) for share in (0.1, 0.3, 1.0))]

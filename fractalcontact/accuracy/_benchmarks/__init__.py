@@ -14,7 +14,7 @@ from fractalcontact.base.validation import Problems
 
 SUBPACKAGES = ("surfaces", "dimensions", "contact", "domains", "joints")
 POINTS, TOLERANCE = "points along an edge", "tolerance"
-TOLERANCES = tuple(10.0**-k for k in range(2, 11))
+TOLERANCES = tuple(10.0**-k for k in range(2, 11))  # a decade each, down to near rounding
 EXACT = 1e-13  # tolerance of a solution to rounding
 HURST = 0.7  # of the fractional Brownian surfaces
 

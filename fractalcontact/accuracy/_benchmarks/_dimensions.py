@@ -13,9 +13,10 @@ from fractalcontact.accuracy._benchmarks import HURST, Array, Benchmark, Method
 
 Problem = tuple[xr.DataArray, dict[str, Any]]  # an ensemble of surfaces, options of the estimator
 
-MEMBERS = 12
+MEMBERS = 12  # the rms error is then known to a fifth, 1/sqrt(2 n)
+# an octave each
 SIZES = (32, 64, 128, 256, 512)
-WINDOW_SIZE = 256
+WINDOW_SIZE = 256  # of the surfaces of `windows`
 
 
 def benchmarks() -> tuple[Benchmark, ...]:
@@ -32,7 +33,7 @@ def benchmarks() -> tuple[Benchmark, ...]:
     directional = Method("by direction", SIZES[:4], _surfaces, _first_directions, _directional_errors)
     windows = Method(
         "variogram, lags up to 1/parameter of the edge",
-        (32, 16, 8, 4, 2),
+        (32, 16, 8, 4, 2),  # the longest lag from 8 spacings to half the edge
         _window,
         partial(_first_exponent, "variogram"),
         lambda _, parameter: _exponents("variogram", *_window(parameter)) - HURST,
@@ -74,7 +75,7 @@ def _method(
     return Method(name, sizes, prepare, partial(_first_exponent, estimator), errors)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=8)  # 35 MB at most, as every size is kept once
 def _surfaces(n: float, noise: float = 0.0) -> xr.DataArray:
     size = int(n)
     ensemble = surfaces.fbm((size, size), 1.0, hurst=HURST, rms_increment=1.0, members=MEMBERS, rng=size)

@@ -12,13 +12,15 @@ import xarray as xr
 from fractalcontact import domains, surfaces
 from fractalcontact.accuracy._benchmarks import Array, Benchmark, Method, largest_error
 
+# an octave each
 SIZES = (64, 128, 256, 512, 1024)
-HURST, COVERAGE, BOX = 0.5, 0.1, 4
+HURST, COVERAGE, BOX = 0.5, 0.1, 4  # level sets of dimension 1.5; a tenth of the cells; in cells
+# of a cascade, unequal and 1 in all: each order has a dimension of its own
 WEIGHTS = np.array([[0.4, 0.3], [0.2, 0.1]])
 ORDERS = (0.0, 2.0, 3.0)
 # site percolation on the square lattice: coverage, islands per cell, and the excess of a periodic mask
 CRITICAL, PER_CELL, EXCESS = 0.59274605, 0.0275981, 0.8835
-CROSSINGS = 64
+CROSSINGS = 64  # the share that crosses is then known to 1/16, sqrt(.25/64)
 REPLICATES = 8  # random masks of the error; the first is timed
 CARPET = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 
@@ -92,6 +94,7 @@ def _carpet_benchmarks() -> tuple[Benchmark, Benchmark]:
         Method(name, SIZES, _carpet, partial(_number, function, options), error)
         for name, (function, options) in measures.items()
     )
+    # powers of 3, on which the carpet is whole
     area = Method("area dimension", (27, 81, 243, 729), _resolutions, _area_dimension, error)
     no_grid = f"{truth}; the cut fits no grid of boxes"
     return (
@@ -100,7 +103,7 @@ def _carpet_benchmarks() -> tuple[Benchmark, Benchmark]:
     )
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=8)  # the sizes of a benchmark
 def _carpet(n: float) -> xr.DataArray:
     mask = np.ones((1, 1), bool)
     while mask.shape[0] < n:

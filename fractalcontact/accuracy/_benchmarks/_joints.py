@@ -84,7 +84,7 @@ def _hydraulic_aperture(gap: xr.DataArray) -> float:
 
 def _wave_joint(n: float) -> joints.Crack:
     x = np.arange(int(n)) / n
-    heights = np.broadcast_to(np.cos(2 * np.pi * x), (8, int(n)))
+    heights = np.broadcast_to(np.cos(2 * np.pi * x), (8, int(n)))  # 8 equal rows
     return joints.Crack(surfaces.from_array(heights, 1.0 / n, periodic=True), young=YOUNG, poisson=0.2)
 
 
@@ -93,6 +93,7 @@ def _rigid_dilatancy(crack: joints.Crack) -> float:
 
 
 def _sheared_joint(tolerance: float) -> tuple[joints.Crack, float]:
+    # a block of two thirds of the face, which is sheared by four cells
     surface = surfaces.fbm((96, 96), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5)
     return joints.Crack(surface, young=YOUNG, poisson=0.2, block=6.4e-3), float(tolerance)
 

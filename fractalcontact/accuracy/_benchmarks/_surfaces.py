@@ -90,6 +90,7 @@ def _with_cutoffs(n: int, **options: Any) -> xr.DataArray:
 def _scaled_increments(heights: Array) -> Array:
     """Return mean square increments over lag^(2 H), at lags from 1 to n/8."""
     n = len(heights)
+    # six lags: half an octave apart at n = 64, one at 512
     lags = np.unique(np.geomspace(1, max(2, n // 8), 6).astype(int))
     squares = [
         np.mean((heights[lag:] - heights[:-lag]) ** 2) + np.mean((heights[:, lag:] - heights[:, :-lag]) ** 2)
