@@ -5,7 +5,6 @@ import pytest
 
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
-from fractalcontact.contact import _window_solver
 from fractalcontact.contact._kernels import projected_step_sums
 from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet
 from fractalcontact.contact._problem import Body
@@ -99,15 +98,15 @@ def test_open_surroundings_do_not_matter(control):
     np.testing.assert_allclose(around["gap"].isel(inside), cut["gap"], atol=1e-18)
 
 
-def test_single_precision_start_same_solution(monkeypatch):
-    """A large solution starts in single precision, here from 128 x 128 points on; two by two are as one."""
-    monkeypatch.setattr(_window_solver, "SINGLE_FROM", 128 * 128)
+def test_single_precision_start_same_solution():
+    """A solution of 512 x 512 points or more starts in single precision; eight by eight tiles are as one."""
     tile = rough(64)
-    plane = fc.surfaces.from_array(np.tile(tile.values, (2, 2)), 1e-4, periodic=True)
+    plane = fc.surfaces.from_array(np.tile(tile.values, (8, 8)), 1e-4, periodic=True)
     double, mixed = (
-        press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12) for surface in (tile, plane)
+        press(surface, nominal_pressure=[1e5, 1e7], tolerance=1e-12, keep=("state",))
+        for surface in (tile, plane)
     )
-    np.testing.assert_array_equal(mixed["state"], np.tile(double["state"], (1, 2, 2)))
+    np.testing.assert_array_equal(mixed["state"], np.tile(double["state"], (1, 8, 8)))
     np.testing.assert_allclose(mixed["closure"], double["closure"], rtol=1e-12)
 
 
