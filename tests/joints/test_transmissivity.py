@@ -292,7 +292,11 @@ def side_by_side(gap, count, *, periodic):
 
 @pytest.mark.parametrize(
     ("periodic", "contrast", "library"),
-    [(True, None, "pyamg"), (False, 10.0, "pyamg"), pytest.param(True, None, "none", marks=pytest.mark.slow)],
+    [
+        (True, None, "pyamg"),
+        pytest.param(False, 10.0, "pyamg", marks=pytest.mark.slow),
+        pytest.param(True, None, "none", marks=pytest.mark.slow),
+    ],
 )
 def test_multigrid_of_many_cells_and_elimination_of_few_agree(
     make_face, rough, monkeypatch, periodic, contrast, library
