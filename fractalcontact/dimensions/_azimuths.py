@@ -40,7 +40,15 @@ from fractalcontact.dimensions._mode_bins import (
     log_means,
 )
 from fractalcontact.dimensions._mode_fit import FirstFit
-from fractalcontact.dimensions._spectral_posterior import HURST, NOISE, SPREAD, Known, Posterior, posterior
+from fractalcontact.dimensions._spectral_posterior import (
+    DEPARTURE,
+    HURST,
+    NOISE,
+    SPREAD,
+    Known,
+    Posterior,
+    posterior,
+)
 from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -251,7 +259,8 @@ class Classes:
     def fit_metric(self, spectrum: MetricSpectrum) -> tuple[MetricSpectrum, Array, float]:
         """Return the spectrum with the log ratio by Fisher scoring, its covariance, and -2 log evidence.
 
-        The evidence is that of the classes about the mean of their ring, over the prior of the log ratio.
+        The evidence is that of the classes about the mean of their ring, over the prior of the log ratio,
+        which is normal with the probability of a departure, else zero.
         """
         weight = self.count * self.information
         for _ in range(_ROUNDS):
@@ -268,8 +277,10 @@ class Classes:
         excess = self.excess(self.relative(spectrum))
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
         over = np.eye(2) + _PRIOR_LOG_RATIO**2 * information
-        deviance += uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
-        return spectrum, covariance, float(deviance)
+        turned = uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
+        isotropic = uv @ information @ uv  # what deviance is higher by without a metric
+        logs = math.log(DEPARTURE) - 0.5 * turned, math.log(1.0 - DEPARTURE) - 0.5 * isotropic
+        return spectrum, covariance, float(deviance - 2.0 * np.logaddexp(*logs))
 
     @property
     def _logs(self) -> tuple[Array, Array]:

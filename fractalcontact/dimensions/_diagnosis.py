@@ -45,27 +45,22 @@ def resampling(surface: Surface, linear: float = 0.01) -> str:
     """
     if surface.linear_share > linear:
         return (
-            "many heights lie exactly on lines between their neighbours: they were interpolated; "
-            "grid the points with "
-            "fractalcontact.surfaces.from_points, or give `scales` from eight distances of the points on"
+            "many heights lie exactly on lines between their neighbours: they were interpolated; grid the "
+            "points by fractalcontact.surfaces.from_points, or give `scales` from eight of their spacings on"
         )
     if surface.is_enlarged:
         return (
-            "many rows or columns repeat their neighbours: the surface was enlarged; remove the "
-            "repeated ones, or give "
-            "`scales` from eight blocks on"
+            "many rows or columns repeat their neighbours: the surface was enlarged; remove the repeated "
+            "ones, or give `scales` from eight blocks on"
         )
     return ""
 
 
-def rounding_step(
-    surface: Surface, *, rows: int = 16, sample: int = 4096, tolerance: float = 0.02, distinct: float = 0.5
-) -> float:
+def rounding_step(surface: Surface, *, rows: int = 16, sample: int = 4096, tolerance: float = 0.02) -> float:
     """Return the step to which scaled heights were rounded; 0 where none is seen in a sample of some rows.
 
     Second differences are multiples of it, also once a plane was subtracted. `tolerance`: of a step, distance
-    of rounded heights from multiples after a change of unit. `distinct`: share of distinct second
-    differences beyond which heights are not rounded.
+    of rounded heights from multiples after a change of unit.
     """
     lines = surface.heights[:: max(1, surface.shape[0] // rows)]
     bends = np.diff(lines[:, :: -(-lines.size // sample)], 2, axis=1)
@@ -73,7 +68,7 @@ def rounding_step(
     rounding = 64.0 * np.spacing(float(np.nanmax(np.abs(lines), initial=0.0)))  # of the numbers themselves
     levels = np.unique(observed)
     levels = levels[np.diff(levels, prepend=-np.inf) > rounding]
-    if observed.size < 8 or not 2 <= levels.size <= distinct * observed.size:
+    if observed.size < 8 or levels.size < 2:
         return 0.0
     gaps = np.diff(levels)
     step = float(gaps[gaps > tolerance * np.median(gaps)].min())
@@ -174,9 +169,8 @@ def _seams(heights: Array, step: float, points: int = 512) -> str:
         number = int(np.sum(np.log(squares) - middle > _DEVIATIONS * (high - low) / 1.349))
         if number > 0:
             return (
-                f"heights jump between {name} at {number} places, as at seams of tiles: analyse the "
-                f"tiles one by one, "
-                "or level them first"
+                f"heights jump between {name} at {number} places, as at seams of tiles: analyse the tiles "
+                "one by one, or level them first"
             )
     return ""
 
@@ -210,6 +204,6 @@ def _missing_extremes(heights: Array, edge: int = 15, fewest: int = 12) -> str:
     which = "low" if z < 0 else "high"
     return (
         f"{which} heights are missing: those beside gaps lie {abs(z):.1f} standard deviations "
-        f"{'below' if z < 0 else 'above'} their surroundings; scan again with a larger range, or "
-        f"crop to a complete part"
+        f"{'below' if z < 0 else 'above'} their surroundings; scan again with a larger range, or crop to a "
+        "complete part"
     )

@@ -55,7 +55,7 @@ def test_evidence_of_noise_by_quadrature():
         [[log_density(bins, np.array([h, 0.0, nu, 0.0, 0.0, 1.0])) for nu in noises] for h in heights]
     )
     top = plain.max()
-    odds = sp._DEPARTURE / (1.0 - sp._DEPARTURE)
+    odds = sp._NOISY / (1.0 - sp._NOISY)
     expected = odds * np.mean(np.exp(noisy - top)) / np.mean(np.exp(plain - top))
     assert np.log(ratio) == pytest.approx(np.log(expected), abs=0.5)
 
