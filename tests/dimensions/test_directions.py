@@ -500,6 +500,13 @@ def test_white_noise_has_no_exponent_but_zero(n, seed):
     assert not (result["ci_low"] > 0.01).any()
 
 
+@pytest.mark.parametrize("seed", [17, 20])
+def test_white_noise_without_a_lay_keeps_its_exponent(seed):
+    # where every surface had a lay, of some ratio, these had .33 and .31: noise without a lay was as probable
+    white = fc.surfaces.from_array(np.random.default_rng(seed).standard_normal((256, 256)), SPACING)
+    assert (fc.dimensions.directions(white)["hurst"] < 0.1).all()
+
+
 def test_a_step_keeps_its_interval_and_a_lay_on_another_surface_has_none():
     """No metric describes either of them; beside a step lengths hardly differ by azimuth."""
     y, x = np.mgrid[:128, :128] - 64.0
