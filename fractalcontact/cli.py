@@ -32,7 +32,7 @@ from fractalcontact.base.process import block_dask_import, collect_rarely
 from fractalcontact.base.resources import require_libraries
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
-FAILED, WRONG_INPUT, STOPPED = 1, 2, 128
+FAILED, WRONG_INPUT, STOPPED = 1, 2, 128  # and the number of the signal: as of a shell (POSIX)
 TEMPLATE_ARGUMENTS = (  # of `scenes.template`; options of these names give them
     "spacing", "units", "level", "despike", "young", "poisson", "register", "turn_upper", "friction_angle",
     "wall_strength",
@@ -445,7 +445,7 @@ def _error_against_time(options: argparse.Namespace) -> int:
 
 def _write_figure(axes: Any, path: Path) -> None:
     """Write the figure of some Axes as PNG."""
-    axes.flat[0].figure.savefig(path, dpi=150)
+    axes.flat[0].figure.savefig(path, dpi=150)  # 13 pixels for the height of text of 6 points
 
 
 def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:

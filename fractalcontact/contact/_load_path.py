@@ -242,18 +242,13 @@ def closed_form(problem: Problem, control: Control, tolerance: float) -> Solutio
         return Solution(zero, zero, control.closure or 0.0, 0.0, reason="converged")
     elastic = problem.body.periodic and problem.p_max == np.inf
     if elastic and control.closure is not None and control.value >= mean_by_rows(problem.gap):
-        return beyond_full_contact(problem, control.value)
+        # full contact, and an unknown force
+        unknown = np.full(problem.body.shape, np.nan)
+        reason = "beyond_full_contact"
+        return Solution(unknown, unknown, control.value, np.nan, residual=np.nan, reason=reason, work=np.nan)
     if not problem.gap.any():
         return flat_contact(problem, control, tolerance)
     return None
-
-
-def beyond_full_contact(problem: Problem, closure: float) -> Solution:
-    """Return the state of a periodic body closed to its mean plane or beyond: full contact, unknown force."""
-    unknown = np.full(problem.body.shape, np.nan)
-    return Solution(
-        unknown, unknown, closure, np.nan, residual=np.nan, reason="beyond_full_contact", work=np.nan
-    )
 
 
 def flat_contact(problem: Problem, control: Control, tolerance: float) -> Solution | None:

@@ -213,7 +213,10 @@ def _turning_points(path: Any) -> Array:
 
 
 def _cell_step(crack: Crack, towards: Direction, most: int = 8) -> float | None:
-    """Return the shortest shear (m), of `most` cells, that moves the block by whole cells; None without."""
+    """Return the shortest shear (m), of `most` cells, that moves the block by whole cells; None without.
+
+    Towards NE it takes 3 cells where spacings are as 2 to 3: `most` is the greatest number of such a ratio.
+    """
     layout = crack.layout
     axis = int(np.argmax(np.abs(towards.unit)))
     for cells in range(1, most + 1):

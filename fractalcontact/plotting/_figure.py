@@ -121,14 +121,6 @@ def _are_numbers(value: Any) -> bool:
     return values is not None and np.ndim(value) == 1 and bool(np.isfinite(values).all())
 
 
-def _are_ends(value: Any) -> bool:
-    return _are_numbers(value) and len(value) == 2
-
-
-def _is_count(value: Any) -> bool:
-    return is_real(value) and isinstance(value, (int, np.integer)) and bool(value >= 1)
-
-
 def _are_words(value: Any) -> bool:
     return isinstance(value, (list, tuple)) and all(isinstance(word, str) for word in value)
 
@@ -146,14 +138,17 @@ OPTIONS: dict[str, tuple[str, Test]] = {
     **dict.fromkeys(("against", "title", "band_name"), ("words", lambda value: isinstance(value, str))),
     "ax": ("an Axes, or None", _is_axes),
     "axes": ("a sequence of Axes, a Figure or SubFigure, or None", _are_panels),
-    "band": ("two numbers", _are_ends),
+    "band": ("two numbers", lambda value: _are_numbers(value) and len(value) == 2),
     "block": ("a DataArray with x and y", lambda value: isinstance(value, xr.DataArray)),
     "direction": (
         "a word or degrees anticlockwise from E",
         lambda value: isinstance(value, str) or _is_number(value),
     ),
     "marked": ("a sequence of numbers", _are_numbers),
-    "panels": ("an integer >= 1", _is_count),
+    "panels": (
+        "an integer >= 1",
+        lambda value: is_real(value) and isinstance(value, (int, np.integer)) and bool(value >= 1),
+    ),
     "units": UNITS_EXPECTED,
     "variable": (
         "the name of a variable, or several",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _paths, _style
@@ -289,7 +290,7 @@ def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> A
         panel.ax.set_title(f"block slides {_paths.direction_name(words(data['direction'])[0])}")
     for number, target in enumerate(marked):
         index = nearest(shear, target)
-        if np.isclose(shear[index], target, rtol=1e-6, atol=0.0):
+        if np.isclose(shear[index], target, rtol=UNIFORM, atol=0.0):
             panel.mark(shear[[index]], panel.y.values[-1, [index]], loads.styles[-1]["color"], number)
     return panel.finish()
 

@@ -180,7 +180,8 @@ def _median_cells(mask: Array) -> float:
 def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset, least: int = 30) -> Iterator[str]:
     """Yield at how many loads the contacts have too few cells, and what the grid does to their areas.
 
-    An island of fewer than `least` cells has the area and the shape of the grid.
+    An island of fewer than `least` cells has the area and the shape of the grid: a disc of 30
+    cells is counted a tenth too large, by `EXCESS_PER_EDGE`.
     """
     cells = _cells_per_island(pressed)
     others = [dim for dim in cells.dims if dim != "step"]

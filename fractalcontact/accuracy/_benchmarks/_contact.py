@@ -104,7 +104,7 @@ def _rough_benchmarks() -> tuple[Benchmark, ...]:
                 Method(
                     f"fast, {name}",
                     TOLERANCES,
-                    _rough_at_tolerance,
+                    lambda tolerance: (float(tolerance), _rough()),
                     partial(_press_rough, options),
                     _pressure_error(options),
                     TOLERANCE,
@@ -121,10 +121,6 @@ def _rough() -> xr.DataArray:
     return surfaces.spectral(
         (128, 128), 1e-5, hurst=0.8, rms_slope=0.1, rolloff=64e-5, short_cutoff=4e-5, rng=3
     )
-
-
-def _rough_at_tolerance(tolerance: float) -> tuple[float, xr.DataArray]:
-    return float(tolerance), _rough()
 
 
 def _press_rough(options: dict[str, Any], problem: tuple[float, xr.DataArray]) -> Array:
