@@ -34,9 +34,7 @@ def _check(problems: Problems) -> None:
     given = problems.given
     valid_plane = _from_array.check_axes(problems)
     axes = np.size(given.shape) if valid_plane else 2
-    valid_hurst = problems.numbers(
-        "hurst", at_least=HURST_RANGE["at_least"], at_most=1.0
-    ) and problems.require(
+    valid_hurst = problems.numbers("hurst", **{**HURST_RANGE, "at_most": 1.0}) and problems.require(
         np.size(given.hurst) <= axes, "hurst", "one number" + (" or (y, x)" if axes == 2 else "")
     )
     problems.exactly_one(rms_height=given.rms_height, rms_slope=given.rms_slope)
@@ -322,10 +320,8 @@ class _Band:
         if self.anisotropy_ratio == 1.0:
             return amplitude
         mirrored = self.amplitude(-qy, qx)
-        is_nyquist = np.isclose(np.abs(qy), nyquist[0], ROUNDED - 1.0) | np.isclose(
-            qx, nyquist[1], ROUNDED - 1.0
-        )
-        return np.where(is_nyquist, np.sqrt(0.5 * (amplitude**2 + mirrored**2)), amplitude)
+        y_is_last, x_is_last = np.abs(qy) * ROUNDED >= nyquist[0], qx * ROUNDED >= nyquist[1]
+        return np.where(y_is_last | x_is_last, np.sqrt(0.5 * (amplitude**2 + mirrored**2)), amplitude)
 
 
 def _filtered_modes(
