@@ -317,9 +317,8 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
 
     def across(lengths: Any) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(
-                (np.log(lengths) - ends[0]) / max(ends[1] - ends[0], 1e-9)
-            )  # of one length alone
+            # one length alone has no range
+            return np.asarray((np.log(lengths) - ends[0]) / max(ends[1] - ends[0], 1e-9))
 
     def polylines(slopes: Array) -> list[str]:
         """Return the points of each curve; of a dimension from 0 to 2, upwards."""
