@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 from typing import Any
 
@@ -127,6 +128,7 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     below.finish(log="x", empty="")
     upper.set_title(name.replace("_", " "))
     upper.set_xlabel("")
+    upper.set_ylabel(textwrap.fill(upper.get_ylabel(), 28))  # two thirds of a figure high
     upper.tick_params(labelbottom=False)
 
 

@@ -154,7 +154,7 @@ def scans(result: Any, *, units: Units | None = None, axes: Panels | None = None
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
     names = [name for name in names if data[name].max() > data[name].min()] or names
     with Problems("fc.plotting") as problems:
-        problems.require(bool(names), "result", "numbers over scan", NONE)
+        problems.require(SCAN in result.dims and bool(names), "result", "numbers over scan", NONE)
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
     for ax, name in zip(shown, names, strict=False):
         _draw_distribution(ax, data, name)

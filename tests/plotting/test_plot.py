@@ -73,5 +73,7 @@ def test_wrong_calls_are_refused(study):
         plotting.plot(study)
     with pytest.raises(InvalidInput, match="variable: expected one of residual: the result has no standard"):
         plotting.plot(pressed()[["residual"]])
+    with pytest.raises(InvalidInput, match="result: expected numbers over scan, got none"):
+        plotting.plot(pressed(), "scans")
     with pytest.raises(InvalidInput, match="no standard figure"):
         plotting.plot(result_of("contact.theories"))
