@@ -29,6 +29,13 @@ def public_names():
                 yield f"{subpackage}.{name}"
 
 
+@pytest.mark.parametrize("subpackage", ["surfaces", "dimensions"])
+def test_list_of_a_subpackage_has_every_public_name(subpackage):
+    module = importlib.import_module(f"fractalcontact.{subpackage}")
+    listed = {line.partition(" ")[0] for line in module.__doc__.splitlines()}
+    assert {name for name in module.__all__ if callable(getattr(module, name))} <= listed
+
+
 @pytest.fixture(autouse=True)
 def _in_an_empty_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

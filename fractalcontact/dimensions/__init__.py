@@ -2,6 +2,7 @@
 
 estimate          Hurst exponent and fractal dimension with a 95 % interval
 methods           names of the methods of `estimate`, with one line each
+pool              common exponent of several scans, and their scatter
 directions        exponent by direction, and tests of isotropy
 hurst_map         exponent in windows that move over the surface
 waves             single waves, such as marks of machining

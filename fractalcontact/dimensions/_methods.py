@@ -65,7 +65,7 @@ class Method:
     ignores_plane : bool
         Whether the curve does not change when a plane is added.
     natural_scale : bool
-        Whether the slope depends on the unit of height.
+        Whether heights count as lengths, as with cubes and dividers: the slope then depends on their unit.
     """
 
     description: str

@@ -15,6 +15,8 @@ level        remove the mean, a plane or a quadric
 despike      remove isolated outliers of a scan
 fill         fill small gaps
 describe     statistics of heights, slopes and curvature
+texture      correlation lengths, and the core of the height distribution (ISO 25178-2)
+gaussian_filter  waviness or roughness, by the Gaussian filter of ISO 16610
 
 A surface is a DataArray `height` with dims (y, x), in metres, heights up, x and y ascending at cell centres.
 """
