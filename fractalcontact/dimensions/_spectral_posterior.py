@@ -49,7 +49,7 @@ LOWEST, HIGHEST = 0.005, 0.995  # H
 # Intervals of 10800 surfaces of 33 kinds, 128 x 128 points, hold H in .960, .968, .973, .978 and .984 with
 # .06, .08, .1, .12 and .15 (noise alike); fewer than .9 in 14, 12, 9, 6 and 5 of 96 cells; widths .85 to 1
 DEPARTURE = 0.1
-# Of noise, which any instrument adds. Where it is just not seen intervals hold H in .69, .81, .87 and .93
+# Of noise, which any instrument adds. Where it is just not seen intervals hold H in .70, .80, .87 and .93
 # with .1, .2, .3 and .5 (noise of .05, H = .9, 256 x 256 points), .47 .70 .72 .72 (.2, .5, 128 x 128); those
 # of exact surfaces, 128 x 128, are 2 to 11, 5 to 20 and 9 to 34 % wider than with .1
 _NOISY = 0.2
