@@ -5,6 +5,10 @@ The pressure with 0 <= p <= p_max minimises
     1/2 p K p + p h                  among the pressures of a given sum (force control), or
     1/2 p K p + p (h - closure)      among all (closure control).
 
+The law of contact, 0 <= p <= p_max, stands in the free set and the projection here, in the passes of
+`_kernels` and in `_capped_simplex`; nodes that bear nothing are open in `_load_path.Step`. That no gap closes
+away from the window (`_window_solver`) holds for pressures alone, not for adhesion.
+
 Symbols are those of Polonsky and Keer where they have one:
 
     p      pressure                          h      gap of the undeformed surface at first touch
@@ -19,8 +23,8 @@ the right, in words, where it differs:
 
     (1)  closure = sum p (u + h) / sum p over p < p_max under        mean of u + h over I_c
          force control; objective 1/2 p u + p h
-    (2)  residual: (sum p max(g, 0) / sum p + largest overlap)       change of p in the last iteration
-         / scale
+    (2)  residual: (sum p max(g, 0) / sum p + largest overlap        change of p in the last iteration
+         over p < p_max) / scale
     (3)  free set I_c: 0 < p < p_max, and where admitted the nodes   p > 0; overlapping nodes are given the
          outside that violate the conditions                         pressure -tau g at the end of the step
     (4)  z = M (g - mean g) on I_c, less its mean under force        z = g - mean g
@@ -231,7 +235,7 @@ class ConstrainedCG:
         """
         self.initialise()
         progress, iteration, reason = Progress(), 0, "iteration_limit"
-        while iteration <= MAX_ITERATIONS:
+        while True:
             evaluation = self.evaluate()  # (1)
             if self.overshot(evaluation, progress):
                 self.backtrack()
@@ -244,6 +248,8 @@ class ConstrainedCG:
                     break
                 self.update_displacement()
                 continue
+            if iteration == MAX_ITERATIONS:  # before a step: closure and residual are those of the pressure
+                break
             progress.update(residual, evaluation.objective, least_fall * evaluation.objective_size)
             at_rounding = residual <= evaluation.residual_floor
             iteration += 1

@@ -106,7 +106,7 @@ def press(
     method : {"fast", "elimination"}
         Constrained conjugate gradients, or the dense active set of the 1998 paper for small surfaces.
     keep : any of "state", "pressure", "gap", "displacement", "residual_height"
-        Maps (step, y, x) to return: flags open, contact, yielded; Pa; m; m; heights after unloading (m).
+        Maps (step, y, x) to return: flags (yielded: at the hardness); Pa; m; m; heights after unloading (m).
     include : any of "stiffness", "pressure_distribution"
         Further results: stiffness and conductance, from one more solution a step; shares of the pressures.
     progress : bool

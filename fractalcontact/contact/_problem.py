@@ -36,6 +36,7 @@ INFLUENCE_SOURCES = {
     "square": "Love, Phil. Trans. R. Soc. A 228:377 (1929)",
     "spectral": "Stanley and Kato, J. Tribol. 119:481 (1997)",
 }
+HARDNESS = "Almqvist, Sahlin, Larsson and Glavatskih, Tribol. Int. 40:574 (2007) (hardness)"
 YASTREBOV = "Yastrebov, Anciaux and Molinari, Tribol. Int. 114:161 (2017) (perimeter correction)"
 # relative: a force of hardness times area, or of sliding, may miss it by so much, and forces that differ by
 # less share one solution
@@ -96,9 +97,8 @@ class ContactOptions:
 
     def references(self, grid: Grid) -> str:
         """Return the sources of the methods used on this grid."""
-        return joined_references(
-            SOLVER_SOURCES[self.method], INFLUENCE_SOURCES[self.influence_on(grid)], YASTREBOV
-        )
+        sources = SOLVER_SOURCES[self.method], INFLUENCE_SOURCES[self.influence_on(grid)], YASTREBOV
+        return joined_references(*sources, *([] if self.hardness is None else [HARDNESS]))
 
     def is_periodic(self, grid: Grid) -> bool:
         """Return whether the bodies on this grid are periodic."""
