@@ -310,7 +310,7 @@ def _available_processors() -> int:
 
 def most_workers() -> int:
     """Return the largest number of processes that a study may be shared between."""
-    return max(8, 4 * (os.cpu_count() or 1))  # more only wait: it refuses a slip of the keyboard
+    return max(8, 4 * (os.cpu_count() or 1))  # more would only wait: a slip of the keyboard
 
 
 @contextmanager

@@ -259,8 +259,8 @@ class Classes:
     def fit_metric(self, spectrum: MetricSpectrum) -> tuple[MetricSpectrum, Array, float]:
         """Return the spectrum with the log ratio by Fisher scoring, its covariance, and -2 log evidence.
 
-        The evidence is that of the classes about the mean of their ring, over the prior of the log ratio,
-        which is normal with the probability of a departure, else zero.
+        The evidence is that of the classes about the mean of their ring, over the prior of the log ratio. A
+        lay is there with the probability of a departure, and its log ratio is normal; without one it is zero.
         """
         weight = self.count * self.information
         for _ in range(_ROUNDS):
@@ -278,7 +278,7 @@ class Classes:
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
         over = np.eye(2) + _PRIOR_LOG_RATIO**2 * information
         turned = uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
-        isotropic = uv @ information @ uv  # what deviance is higher by without a metric
+        isotropic = uv @ information @ uv  # by so much the deviance is higher without a lay
         logs = math.log(DEPARTURE) - 0.5 * turned, math.log(1.0 - DEPARTURE) - 0.5 * isotropic
         return spectrum, covariance, float(deviance - 2.0 * np.logaddexp(*logs))
 

@@ -45,8 +45,8 @@ def resampling(surface: Surface, linear: float = 0.01) -> str:
     """
     if surface.linear_share > linear:
         return (
-            "many heights lie exactly on lines between their neighbours: they were interpolated; grid the "
-            "points by fractalcontact.surfaces.from_points, or give `scales` from eight of their spacings on"
+            "many heights lie exactly on lines between neighbours: they were interpolated; grid the points "
+            "with fractalcontact.surfaces.from_points, or give `scales` from eight distances of points on"
         )
     if surface.is_enlarged:
         return (

@@ -279,9 +279,10 @@ def hypotheses(known: Known) -> list[Hypothesis]:
         if (is_blurred and spread is not None) or (noise is not None and is_noisy != (noise > 0.0)):
             continue
         has_blur = is_blurred or bool(spread)
-        if (is_bent and known.is_window) or (form == FILTERED and not has_blur):  # the same as ALIASED
+        # in a window that was chosen there is no corner; without a blur FILTERED is ALIASED
+        if (is_bent and known.is_window) or (form == FILTERED and not has_blur):
             continue
-        # where something is known all of them lack a factor
+        # what is known gives all hypotheses the same factor, which changes no share
         log_prior = math.log(_NOISY if is_noisy else 1.0 - _NOISY)
         for is_there in (form == UNALIASED, is_blurred, is_bent):
             log_prior += math.log(DEPARTURE if is_there else 1.0 - DEPARTURE)

@@ -295,9 +295,8 @@ def _archive_content(request: Request) -> FileContent:
                 problems.require(is_even, dim, "evenly spaced coordinates", "uneven ones")
         values = values[..., :: int(np.sign(steps[0][0])), :: int(np.sign(steps[1][0]))]
         spacing = [float(abs(step).mean()) for step in steps]
-        return _heights_content(
-            values, replace(request, spacing=spacing)
-        )  # no points, of three columns either
+        # heights, even if three columns look like points
+        return _heights_content(values, replace(request, spacing=spacing))
     with Problems(WHERE, UnreadableFile) as problems:
         expected = f"dims (y, x), as of the arrays y and x {tuple(stated)}"
         problems.require(spacing is not None or stated != shape[::-1], str(name), expected, tuple(shape))

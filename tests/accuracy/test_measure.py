@@ -139,17 +139,17 @@ def measure_stubs(*methods, budget=20.0, **options):
 
 
 def test_front_and_memory_of_known_methods():
-    quick = stub("quick", [0.004, 0.016], [0.1, 0.02])
-    slow = stub("slow", [0.012, 0.032], [0.2, 0.05])
-    fine = stub("fine", [0.024], [0.001])
-    alone = stub("other", [0.004], [0.5])
+    quick = stub("quick", [0.01, 0.04], [0.1, 0.02])
+    slow = stub("slow", [0.03, 0.08], [0.2, 0.05])
+    fine = stub("fine", [0.06], [0.001])
+    alone = stub("other", [0.01], [0.5])
     benchmarks = Benchmark("a", "", "known", (quick, slow, fine)), Benchmark("b", "", "known", (alone,))
     tree = fc.accuracy.measure({"contact": benchmarks}, budget=20)
     data = tree["contact"].to_dataset()
     for method, expected in {"quick": [1, 1], "slow": [0, 0], "fine": [1, 0], "other": [1, 0]}.items():
         assert data.sel({"method": method})["on_pareto_front"].values.tolist() == expected, method
     np.testing.assert_allclose(data["memory"].sel({"method": "quick"}), [8000, 16000], rtol=0.2)
-    np.testing.assert_allclose(data["run_time"].sel({"method": "slow"}), [0.012, 0.032], rtol=0.3)
+    np.testing.assert_allclose(data["run_time"].sel({"method": "slow"}), [0.03, 0.08], rtol=0.3)
     stars = [line.split()[0] for line in fc.accuracy.summary(tree).splitlines() if line.endswith("*")]
     assert stars == ["quick", "quick", "fine", "other"]
 
@@ -161,17 +161,17 @@ def test_random_errors_are_those_of_all_replicates():
 
 
 def test_small_budget_measures_every_method_once():
-    flat = stub("flat", [0.004, 0.008, 0.016], [0.1, 0.09, 0.08])
-    steep = stub("steep", [0.008, 0.012, 0.02], [0.2, 0.15, 0.001])
-    small, large = (np.isfinite(measure_stubs(flat, steep, budget=b)["error"]) for b in (0.02, 20.0))
+    flat = stub("flat", [0.01, 0.02, 0.04], [0.1, 0.09, 0.08])
+    steep = stub("steep", [0.02, 0.03, 0.05], [0.2, 0.15, 0.001])
+    small, large = (np.isfinite(measure_stubs(flat, steep, budget=b)["error"]) for b in (0.05, 20.0))
     assert small.values.tolist() == [[True], [True]]
     assert large.values.all()
 
 
 def test_inputs_given_are_compared_at_equal_size_only():
-    first = stub("first", [0.004, 0.008, 0.012], [0.4, 0.2, 0.1])
-    late = stub("second", [0.012, 0.024], [0.5, 0.3])
-    early = stub("second", [0.0016, 0.024], [0.5, 0.3])
+    first = stub("first", [0.01, 0.02, 0.03], [0.4, 0.2, 0.1])
+    late = stub("second", [0.03, 0.06], [0.5, 0.3])
+    early = stub("second", [0.004, 0.06], [0.5, 0.3])
     assert measure_stubs(first, late)["on_pareto_front"].values.tolist() == [[True] * 3, [False] * 3]
     at_equal_size = measure_stubs(first, early, equal_parameters=True)
     assert at_equal_size["on_pareto_front"].values.tolist() == [[True] * 3, [True, False, False]]

@@ -1,11 +1,13 @@
 """Expected power of Fourier modes under a metric, beside sums over all pairs of points."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fractalcontact.dimensions._azimuths import PlaneModes
+import fractalcontact as fc
+from fractalcontact.dimensions._azimuths import PlaneModes, fit_azimuths
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, mixture, weights
 from fractalcontact.dimensions._metric_spectrum import (
     MetricSpectrum,
@@ -13,6 +15,9 @@ from fractalcontact.dimensions._metric_spectrum import (
     metric_of,
     squared_length,
 )
+from fractalcontact.dimensions._mode_fit import first_fit
+from fractalcontact.dimensions._spectral_posterior import DEPARTURE, Known
+from fractalcontact.dimensions._surface_input import read_surfaces
 
 SHAPE, DY = (36, 33), 1.3
 STENCIL = {
@@ -89,3 +94,29 @@ def test_densities_under_a_metric_are_sums_over_all_images(ratio, dy):
     ):
         deviation = np.log(found / plain)
         assert np.abs(deviation - np.median(deviation)).max() < 2e-3
+
+
+@pytest.mark.parametrize("anisotropy_ratio", [1.0, 1.15, 2.0])
+def test_evidence_of_a_lay_by_quadrature(anisotropy_ratio):
+    """The log ratio of lengths is zero, or, with the probability of a departure, normal: a sum over both."""
+    surface = fc.surfaces.spectral(
+        (64, 64), 1e-4, hurst=0.5, rms_height=1e-6, anisotropy_ratio=anisotropy_ratio, direction=30.0, rng=2
+    )
+    fit = fit_azimuths(first_fit(read_surfaces(surface)[0]), None, Known())
+    classes, start = fit.classes, replace(fit.spectrum, log_ratio=fit.uv)
+    weight = classes.count * classes.information
+
+    def likelihood(uv):
+        excess = classes.excess(classes.relative(replace(start, log_ratio=np.array(uv))))
+        return np.exp(-weight @ (excess - np.log(1.0 + excess)) - least)
+
+    least = 0.0  # of the logarithm, so that nothing underflows
+    least = np.log(likelihood(fit.uv))
+    deviation, step = np.log(2.0), 0.25 * np.sqrt(np.linalg.eigvalsh(fit.covariance)[0])
+    steps = step * np.arange(-24, 25)
+    nodes = [np.add(fit.uv, (du, dv)) for du in steps for dv in steps]
+    prior = [np.exp(-0.5 * uv @ uv / deviation**2) / (2.0 * np.pi * deviation**2) for uv in nodes]
+    with_lay = step**2 * sum(p * likelihood(uv) for p, uv in zip(prior, nodes, strict=True))
+    expected = DEPARTURE * with_lay + (1.0 - DEPARTURE) * likelihood((0.0, 0.0))
+    found = np.exp(-0.5 * classes.fit_metric(start)[2] - least)
+    assert np.log(found) == pytest.approx(np.log(expected), abs=0.3)

@@ -229,7 +229,7 @@ copies, counts = [], []
 
 def note(name):
     counts.append(resources.thread_count())
-    time.sleep(0.3 if len(counts) == 1 else 0)
+    time.sleep(0.6 if len(counts) == 1 else 0)
 
 os.register_at_fork(before=lambda: copies.append(1))
 watch_calls(types.SimpleNamespace(setattr=setattr), note)
