@@ -57,7 +57,7 @@ def result_of(
             problems.require(
                 dataset.sizes[dim] == 1, argument, f"one {dim}; choose with .sel or .isel", dataset.sizes[dim]
             )
-        for dim in set(dims).intersection(dataset.variables) - set(dataset.dims):
+        for dim in (dim for dim in dims if dim in dataset.variables and dim not in dataset.dims):
             over = dataset[dim].dims  # a variable of this name, as the shear of `direct_shear` over points
             problems.require(not over, argument, f"a result over {dim}", f"one with {dim} over {over}")
     dataset = dataset.isel(dict.fromkeys(extra, 0))
