@@ -68,6 +68,9 @@ What was tried:
 - Taking the last measured length for a step that will be projected, to save K t, makes an iteration cost two
   pairs, and needs so many more iterations that cold starts gain nothing and paths take four times as many:
   rejected.
+- K t in single precision, as the preconditioner is, with u computed anew at the end, saves a tenth of the
+  time at a tolerance of 1e-8. At 1e-10 it takes a tenth more transforms, and a body 4000 times longer than
+  wide stops at a residual of 3e-4: rejected.
 - A start on coarser grids (nested iteration) saves up to a third of the iterations from n = 1024 on, but no
   time: rejected.
 - Where the objective rises, the step is halved until it does not.
@@ -93,8 +96,13 @@ from fractalcontact.contact._capped_simplex import (
     scale_to_force,
     uniform_on_lowest,
 )
-from fractalcontact.contact._operator import Operator, PeriodicOperator
-from fractalcontact.contact._preconditioner import ExtensionPreconditioner, FreeSet, Preconditioner
+from fractalcontact.contact._operator import Operator
+from fractalcontact.contact._preconditioner import (
+    ExtensionPreconditioner,
+    FreeSet,
+    Preconditioner,
+    precision_for,
+)
 from fractalcontact.contact._problem import Control, Problem, Solution, strips, sum_by_rows
 
 # 206 solutions on rough surfaces took 20 at most at a tolerance of 1e-10, and 3828 runs of the tests,
@@ -133,9 +141,7 @@ class ContactSystem:
         """Return the system of all nodes of a problem; its operator may be given."""
         body = problem.body
         operator = operator or body.operator(dtype)
-        # that of a periodic body serves both, with its array of the modes
-        multiplier = operator.multiplier if isinstance(operator, PeriodicOperator) else None
-        preconditioner = ExtensionPreconditioner(body, dtype, multiplier)
+        preconditioner = ExtensionPreconditioner(body, operator.memory, precision_for(body, dtype))
         scale = problem.local_compliance if local_compliance is None else local_compliance
         return cls(problem.gap, problem.p_max, operator, preconditioner, scale, dtype)
 
@@ -160,6 +166,10 @@ class GapSums:
     count: float
     g: float
     g2: float
+
+    def __add__(self, other: GapSums) -> GapSums:
+        """Return the sums over both sets."""
+        return GapSums(self.count + other.count, self.g + other.g, self.g2 + other.g2)
 
 
 class Progress:
@@ -187,7 +197,8 @@ class ConstrainedCG:
 
         step                     p                     work_array
         (1) to (3)               pressure              last p if its step was projected, else of no use
-        (4) to (6)               pressure              z (a free body has a wider plane for it, `wide`)
+        (4) to (6)               pressure              z, in half of it if that is double precision (a free
+                                                       body has a wider plane for z, `wide`)
         (7) to (10)              p - tau t             r = K t
         (9), (10) projected      projected p - tau t   p before the step: the two arrays are swapped
 
@@ -209,9 +220,9 @@ class ConstrainedCG:
         self.u = RELEASED  # displacement, see `update_displacement`
         self.t = np.zeros(shape, dtype=self.dtype)  # search direction
         self.work_array = np.zeros(shape, dtype=self.dtype)  # see the table above
-        wide = self.preconditioner.plane_shape
-        self.wide = None if wide == shape else np.zeros(wide, dtype=self.dtype)
-        self.free_set = FreeSet.empty(wide, self.preconditioner.bin_shape, self.dtype)
+        plane, dtype = self.preconditioner.plane_shape, self.preconditioner.dtype
+        self.wide = None if plane == shape else np.zeros(plane, dtype)
+        self.free_set = FreeSet.empty(plane, self.preconditioner.bin_shape, dtype)
         self.tau, self.G = 0.0, 0.0
         self.updates = 0  # steps that the displacement has followed since it was computed, u = K p
         self.projected = False  # the last step left the bounds and was projected
@@ -376,14 +387,12 @@ class ConstrainedCG:
         mean_part = inside.g**2 / inside.count if self.force_controlled and inside.count else 0.0
         spread = max(inside.g2 - mean_part, 0.0)
         admit = bool(outside.g2 > admit_ratio**2 * spread or outside.count < few * inside.count)
-        count, g_sum = (inside.count, inside.g)
-        if admit:
-            count, g_sum = inside.count + outside.count, inside.g + outside.g
-        if count == 0:
+        free = inside + outside if admit else inside
+        if free.count == 0:
             return False
         closure = self.dtype(evaluation.closure)
-        z, constant, beta = self.preconditioned_residual(closure, admit, count, g_sum)
-        factors, state = (self.dtype(constant), self.dtype(beta)), (self.h, self.u, closure)
+        z, *factors = self.preconditioned_residual(closure, admit, free)
+        factors, state = [self.dtype(factor) for factor in factors], (self.h, self.u, closure)
         t_sum, t_g = self.pass_sums(
             _kernels.search_direction, self.free_set.mask, z, *factors, *state, self.t
         )[:2]  # (6)
@@ -400,37 +409,38 @@ class ConstrainedCG:
         return True
 
     def preconditioned_residual(
-        self, closure: Any, admit: bool, count: float, g_sum: float, *, slight_change: float = 0.001
-    ) -> tuple[Array, float, float]:
-        """Return z (3, 4), the constant to subtract from it, and beta (5).
+        self, closure: Any, admit: bool, free: GapSums, *, slight_change: float = 0.001
+    ) -> tuple[Array, float, float, float]:
+        """Return z in units of its own (3, 4), the unit, the constant to subtract from z, and beta (5).
 
-        The constant is the mean of z under force control; under closure control of a periodic body minus the
-        uniform pressure that closes the mean gap. `slight_change` is the share of the free set that may
-        change without loss of the conjugacy.
+        The unit keeps z within the range of single precision. The constant is the mean of z under force
+        control; under closure control of a periodic body minus the uniform pressure that closes the mean gap.
+        `slight_change` is the share of the free set that may change without loss of the conjugacy.
         """
-        shift = self.dtype(g_sum / count if self.force_controlled else 0.0)
+        shift = self.dtype(free.g / free.count if self.force_controlled else 0.0)
+        unit = self.dtype(np.sqrt(free.g2 / free.count)) or self.dtype(1)
         bin_columns, free_set = self.preconditioner.bin_columns, self.free_set
-        plane = self.work_array if self.wide is None else self.wide
-        if self.wide is not None:  # the margin of a free body
+        plane = self.wide
+        if plane is None:
+            plane = np.frombuffer(self.work_array, self.preconditioner.dtype, self.h.size)
+            plane = plane.reshape(self.h.shape)
+        else:  # the margin of a free body
             plane[self.h.shape[0] :] = 0
             plane[:, self.h.shape[1] :] = 0
-        state = (self.h, self.u, self.p, self.p_max, closure, admit, shift)
+        state = (self.h, self.u, self.p, self.p_max, closure, admit, shift, unit)
         written = (free_set.mask, plane, free_set.bin_sums, free_set.bin_counts)
         changes = self.pass_sums(_kernels.select_free_set, bin_columns, *state, *written)[0]  # (3)
         if changes > 0:
             free_set.weight = None
-        plane, extra = self.preconditioner.apply(plane, free_set)
-        if self.wide is None:
-            self.work_array = plane
-        else:
-            self.wide = plane
-        arrays = (self.h, self.u, self.t, closure, plane)
+        z, extra = self.preconditioner.apply(plane, free_set)
+        arrays = (self.h, self.u, self.t, closure, z)
         z_sum, z_g, t_sum = self.pass_sums(_kernels.add_bins, bin_columns, free_set.mask, extra, *arrays)[:3]
-        mean = z_sum / count if self.force_controlled else -self.uniform_pressure(g_sum)
-        G_old, self.G = self.G, float(z_g - mean * g_sum)  # (5), z with its mean taken off
-        beta = self.G / G_old if changes <= slight_change * count and G_old > 0 else 0.0
+        mean = unit * z_sum / free.count if self.force_controlled else -self.uniform_pressure(free.g)
+        G_old, self.G = self.G, float(unit * z_g - mean * free.g)  # (5), z with its mean taken off
+        beta = self.G / G_old if changes <= slight_change * free.count and G_old > 0 else 0.0
         # the part of the last direction that is kept must not change the force either
-        return plane, mean + (beta * t_sum / count if self.force_controlled else 0.0), beta
+        constant = mean + (beta * t_sum / free.count if self.force_controlled else 0.0)
+        return z, float(unit), constant, beta
 
     def uniform_pressure(self, g_sum: float) -> float:
         """Return the uniform pressure on the free set that closes the summed gap (periodic bodies, else 0).

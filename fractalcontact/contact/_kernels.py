@@ -202,15 +202,15 @@ def residual_sums(start, stop, rows, h, u, p, p_max, closure, out):  # type: ign
 
 @sum_kernel
 def select_free_set(  # type: ignore[no-untyped-def]
-    start, stop, rows, columns, h, u, p, p_max, closure, admit, shift, mask, x, bins, counts, out
+    start, stop, rows, columns, h, u, p, p_max, closure, admit, shift, unit, mask, x, bins, counts, out
 ):
-    """Choose the free set, put its gap less `shift` into x, and sum both over the bins.
+    """Choose the free set, put its gap less `shift` over `unit` into x, and sum both over the bins.
 
     Free are the nodes with 0 < p < p_max and, where `admit`, the nodes outside that violate the conditions
     of contact. Counts the changes of `mask`.
     """
     ny, nx = p.shape
-    zero = 0 * shift
+    zero, factor = 0 * shift, 1 / unit
     row_sum, row_count = np.empty(nx, x.dtype), np.empty(nx, x.dtype)
     for k in range(start, stop):
         changes = 0
@@ -222,7 +222,7 @@ def select_free_set(  # type: ignore[no-untyped-def]
                 value = p[i, j]
                 violating = ((value <= 0) & (g < 0)) | ((value >= p_max) & (g > 0))
                 free = ((value > 0) & (value < p_max)) | (violating & admit)
-                x[i, j] = g - shift if free else zero
+                x[i, j] = (g - shift) * factor if free else zero
                 row_count[j] += 1 if free else 0
                 changes += free != mask[i, j]
                 mask[i, j] = free
@@ -230,7 +230,7 @@ def select_free_set(  # type: ignore[no-untyped-def]
                 row_sum[j] += x[i, j]
         for b in range(bins.shape[1]):  # not over all nodes with j // columns: divisions take long
             # not summed in the arrays: whether that is vectorised would depend on their places in memory
-            total, count = zero, zero
+            total, count = x.dtype.type(0), x.dtype.type(0)
             for j in range(b * columns, min(b * columns + columns, nx)):
                 total += row_sum[j]
                 count += row_count[j]
@@ -272,7 +272,7 @@ def sum_outside(start, stop, rows, columns, mask, x, bins):  # type: ignore[no-u
 
 @sum_kernel
 def add_bins(start, stop, rows, columns, mask, bins, h, u, t, closure, x, out):  # type: ignore[no-untyped-def]
-    """Add the bins to x, which makes it z; on the free set sum z, z g and t."""
+    """Add the bins to x, which makes it z over its unit; on the free set sum x, x g and t."""
     ny, nx = h.shape
     row = np.empty(nx, x.dtype)
     for k in range(start, stop):
@@ -292,15 +292,17 @@ def add_bins(start, stop, rows, columns, mask, bins, h, u, t, closure, x, out): 
 
 
 @sum_kernel
-def search_direction(start, stop, rows, mask, z, mean, beta, h, u, closure, t, out):  # type: ignore[no-untyped-def]
-    """Set t = z - mean + beta t on the free set and 0 outside; sum t and t g."""
+def search_direction(  # type: ignore[no-untyped-def]
+    start, stop, rows, mask, z, unit, mean, beta, h, u, closure, t, out
+):
+    """Set t = unit z - mean + beta t on the free set and 0 outside; sum t and t g."""
     ny, nx = t.shape
     zero = 0 * mean
     for k in range(start, stop):
         t_sum, t_g = 0.0, 0.0
         for i in range(k * rows, min(k * rows + rows, ny)):
             for j in range(nx):
-                value = z[i, j] - mean + beta * t[i, j] if mask[i, j] else zero
+                value = unit * z[i, j] - mean + beta * t[i, j] if mask[i, j] else zero
                 t[i, j] = value
                 t_sum += value
                 t_g += np.float64(value) * (u[i, j] + h[i, j] - closure)

@@ -17,14 +17,33 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import in_bands
 
 SMALL = 128 * 128  # nodes up to which tables of the modes are kept, also for the next call
+SINGLE: Any = np.float32  # type of the preconditioner, and of a first solution of a large surface
 KEPT = 32  # small bodies whose tables of each sort are kept, at most 8 MB
 NO_WORK: Array = np.empty(0)  # of a filter whose work is not asked for
+
+
+class ModesMemory:
+    """Memory for the modes of one transform, which operators and preconditioner take in turn."""
+
+    def __init__(self) -> None:
+        self.memory = np.empty(0, np.complex128)
+
+    def array(self, shape: tuple[int, int], dtype: Any) -> Array | None:
+        """Return an array for the modes of a real plane; None where the library makes a new one."""
+        if not fft.writes_in_place():
+            return None
+        complex_type, size = np.result_type(dtype, np.complex64), shape[0] * (shape[1] // 2 + 1)
+        needed = -(-size * complex_type.itemsize // self.memory.itemsize)
+        if self.memory.size < needed:
+            self.memory = np.empty(needed, np.complex128)
+        return self.memory.view(complex_type)[:size].reshape(shape[0], -1)
 
 
 class Operator(ABC):
     """Displacement from pressure; counts its pairs of transforms, half a pair for one way."""
 
     def __init__(self, *, is_small: bool) -> None:
+        self.memory = ModesMemory()
         self.is_small = is_small  # the displacement comes with the work, in one call
         self.latest: Array = np.empty(0)  # displacement that came with the work of a small one
         self.transforms = 0.0
@@ -61,8 +80,8 @@ class PeriodicOperator(Operator):
     """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean."""
 
     def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-        self.multiplier = WavenumberMultiplier(shape, spacing)
-        super().__init__(is_small=self.multiplier.is_small)
+        super().__init__(is_small=shape[0] * shape[1] <= SMALL)
+        self.multiplier = WavenumberMultiplier(shape, spacing, self.memory)
 
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, without its mean."""
@@ -87,13 +106,13 @@ class HalfSpaceOperator(Operator):
         self.symbol = convolution_symbol(table, self.padded).astype(dtype)
         self.transform = fft.PlaneTransform(self.padded)
         super().__init__(is_small=self.padded[0] * self.padded[1] <= 4 * SMALL)  # padded to twice the length
-        self.modes: Any = None  # array of the last transform, for the next one
+        self.modes: Any = None  # from one transform to its inverse
         self.planes: tuple[Array, Array] | None = None  # padded, of a small body
 
-    def rounded(self, dtype: Any) -> HalfSpaceOperator:
-        """Return the same operator in another precision, or in the same one with arrays of its own."""
+    def rounded(self, dtype: Any, memory: ModesMemory) -> HalfSpaceOperator:
+        """Return the operator in another precision, or in the same one, with this memory."""
         other = copy(self)
-        other.symbol = self.symbol.astype(dtype, copy=False)
+        other.symbol, other.memory = self.symbol.astype(dtype, copy=False), memory
         other.modes, other.planes, other.transforms = None, None, 0.0
         return other
 
@@ -113,7 +132,7 @@ class HalfSpaceOperator(Operator):
             self.planes = np.zeros(self.padded, pressure.dtype), np.empty(self.padded, pressure.dtype)
         (ny, nx), (loaded, moved) = self.shape, self.planes
         loaded[:ny, :nx] = pressure
-        self.modes = modes = self.transform.forward(loaded, self.modes)
+        modes = self.transform.forward(loaded, self.memory.array(self.padded, pressure.dtype))
         in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, NO_WORK)
         displacement = self.transform.backward(modes, moved)[:ny, :nx]
         if out is None:
@@ -131,12 +150,13 @@ class HalfSpaceOperator(Operator):
         """Set the modes of the displacement, and `work` to the sums over their columns."""
         from fractalcontact.contact._kernels import multiply_modes
 
-        self.modes = modes = fft.rfft2_padded(pressure, self.padded, self.modes)
+        memory = self.memory.array(self.padded, pressure.dtype)
+        self.modes = modes = fft.rfft2_padded(pressure, self.padded, memory)
         in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, work)
 
     def from_modes(self, out: Array | None = None) -> Array:
         """Return the displacement with the present modes, which are used up."""
-        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
+        modes, self.modes = self.modes, None
         return fft.irfft2_cropped(modes, self.padded, self.shape, out)
 
 
@@ -172,10 +192,10 @@ class PairSum(Operator):
 class WavenumberMultiplier:
     """Multiplies the modes of a plane by |q| or 1/|q|, without a table of |q| (another array)."""
 
-    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-        self.shape, self.spacing = shape, spacing
+    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float], memory: ModesMemory) -> None:
+        self.shape, self.spacing, self.memory = shape, spacing, memory
         self.transform = fft.PlaneTransform(shape)
-        self.modes: Any = None  # array of the last transform, for the next one
+        self.modes: Any = None  # from one transform to its inverse
         self.is_small = shape[0] * shape[1] <= SMALL
 
     def apply(
@@ -194,14 +214,11 @@ class WavenumberMultiplier:
         self, plane: Array, factor: float, invert: bool, mean: float, out: Array | None
     ) -> Array:
         """Return the plane filtered by a table, a call for each transform."""
-        modes = self.transform.forward(plane, self.modes)
+        modes = self.transform.forward(plane, self.memory.array(self.shape, plane.dtype))
         weights = wavenumber_weights(self.shape, self.spacing, factor, invert, mean, plane.dtype.char)
         parts = modes.view(plane.dtype)
         np.multiply(parts, weights, out=parts)
-        if not self.transform.in_place:
-            return self.transform.backward(modes)
-        self.modes = modes
-        return self.transform.backward(modes, out)
+        return self.transform.backward(modes, out if self.transform.in_place else None)
 
     def work(self, plane: Array, factor: float, *, invert: bool, mean: float) -> float:
         """Return the sum of a plane times what `apply` would return, and keep the modes for `plane`."""
@@ -215,13 +232,14 @@ class WavenumberMultiplier:
 
         dtype = plane.dtype.type
         qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(self.shape, self.spacing))
-        self.modes = modes = self.transform.forward(plane, self.modes)
+        memory = self.memory.array(self.shape, dtype)
+        self.modes = modes = self.transform.forward(plane, memory)
         weights = (qy2, qx2, dtype(factor), invert, dtype(mean), work)
         in_bands(scale_modes, modes.shape[1], modes.size, fft.real_parts(modes), *weights)
 
     def from_modes(self, out: Array | None = None) -> Array:
         """Return the plane with the present modes, which are used up."""
-        modes, self.modes = self.modes, self.modes if self.transform.in_place else None
+        modes, self.modes = self.modes, None
         return self.transform.backward(modes, out)
 
 

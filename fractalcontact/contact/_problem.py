@@ -20,7 +20,14 @@ from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import PAPER, joined_references
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
-from fractalcontact.contact._operator import KEPT, SMALL, HalfSpaceOperator, Operator, PeriodicOperator
+from fractalcontact.contact._operator import (
+    KEPT,
+    SMALL,
+    HalfSpaceOperator,
+    ModesMemory,
+    Operator,
+    PeriodicOperator,
+)
 
 BOUNDARIES = ("free", "periodic")
 INFLUENCES = ("disc", "square", "spectral")
@@ -327,7 +334,7 @@ class Body:
         if self.periodic:
             return PeriodicOperator(self.shape, self.spacing)
         if self.is_small:
-            return kept_operator(self).rounded(dtype)
+            return kept_operator(self).rounded(dtype, ModesMemory())
         return HalfSpaceOperator(self.influence_table(), dtype)
 
 

@@ -366,7 +366,8 @@ class WindowSolver:
         operator = None
         if dtype is np.float32 and not part.body.periodic:  # the coefficients are computed once for both
             double = self.system(part, np.float64).operator
-            operator = double.rounded(dtype) if isinstance(double, HalfSpaceOperator) else None
+            if isinstance(double, HalfSpaceOperator):
+                operator = double.rounded(dtype, double.memory)
         system = ContactSystem.on_plane(part, dtype, self.problem.local_compliance, operator)
         if not part.body.periodic:
             self._systems[dtype] = system
