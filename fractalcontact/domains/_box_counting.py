@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,6 @@ from fractalcontact.domains import _masks, _random_null, _scaling_fit
 from fractalcontact.domains._box_covers import COVERS, Curve, cover_curve
 from fractalcontact.domains._connected_components import label_planes
 from fractalcontact.domains._masks import Array, Planes
-from fractalcontact.domains._scaling_fit import Fit
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3 (box dimension)"
 # Numbers below are measured on 194 sets of known dimension, 100 to 512 cells a side: 1.000 of the intervals
@@ -88,7 +88,8 @@ def box_dimension(
         Over the leading dims: `box_dimension`, `ci_low`, `ci_high`; the window, `scale_min`, `scale_max`
         (cells), `window_low`, `window_high` (m); `is_saturated`, where more than half of its largest boxes
         meet a set of islands: the dimension then tells little but the coverage;
-        `coverage`; `null_dimension` and `null_spread` of the random null of equal coverage;
+        `coverage`; `null_dimension` and `null_spread` of the random null of equal coverage, in counts
+        averaged over the offsets unless the cover is "aligned";
         `differs_from_random`; `follows_power_law`, False where the local slopes of the window differ by
         more than 0.15. Over `box_size` (cells; `box_length` in m) too: `box_count`, of whole boxes;
         `box_measure`, where boxes cut by the edge count by their part inside; `local_slope`; `null_count`.
@@ -192,7 +193,7 @@ def analyse(
         np.array([getattr(fit, name) for fit in fits]) for name in ("value", "half_width")
     )
     windows = [fit.window for fit in fits]
-    null = _null(planes, sizes, windows, by_regression=by_regression)
+    null = _null(planes, sizes, windows, cover, by_regression=by_regression)
     steady = np.array([fit.follows_power_law for fit in fits])
     ends = np.array([sizes[window][[0, -1]] for window in windows]) * planes.side
     ends = np.where(np.isfinite(dimension)[:, None], ends, np.nan)
@@ -335,7 +336,7 @@ def fit_two_covers(
     if not (np.isfinite(first.dimension) and np.isfinite(second.dimension)):
         return first.dimension if cover == "minimum" else second.dimension, np.nan
     variance = first.spread**2, max(first.spread, second.spread) ** 2
-    both, spread, _ = _scaling_fit.weighted_mean((first.dimension, second.dimension), variance)
+    both, spread = _scaling_fit.weighted_mean((first.dimension, second.dimension), variance)
     difference = abs(first.dimension - second.dimension)
     deviations = _scaling_fit.deviations_of_95_percent(sizes)
     if cover == "minimum":
@@ -348,6 +349,7 @@ def _null(
     planes: Planes,
     sizes: Array,
     windows: list[slice],
+    cover: str,
     *,
     by_regression: bool,
     tested: Sequence[int] = (2, 3, 4),
@@ -358,30 +360,40 @@ def _null(
     """
     shorter = min(planes.sides)
     small = np.array([size for size in tested if 2 * size <= shorter], np.int64)
-    contents = _random_null.box_contents(planes, np.union1d(sizes, small))
     mean = cover_curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
+    contents = _random_null.box_contents(planes, sizes, cover)
+    small_contents = _random_null.box_contents(planes, small, "mean")
+    pairs_of = _random_null.aligned if cover == "aligned" else _random_null.any_place
     counts, rows = [], []
     for plane, (cells, observed) in enumerate(zip(planes.occupied, planes.observed, strict=True)):
-        by_size = contents[min(plane, len(contents) - 1)]
-        boxes = [by_size[size] for size in sizes.tolist()]
-        null = _random_null.expected_counts(cells, observed, sizes**planes.rank, boxes)
+        place = min(plane, len(contents) - 1)
+        boxes = [contents[place][size] for size in sizes.tolist()]
+        largest = (
+            2.0 * float(max(sizes.max(), *tested))
+        ) ** planes.rank  # two corners, or more than two boxes
+        random_cells = _random_null.RandomCells(cells, observed, largest)
+        null = random_cells.expected_counts(boxes)
         used, part = sizes[windows[plane]], null[windows[plane]]
-        fit = (
-            _scaling_fit.fit_regression(used, part)
-            if by_regression
-            else _scaling_fit.fit_steady_ratio(used, part * used**2)
-        )
-        has_value = np.isfinite(fit.dimension)
-        deviation = np.nan
-        if has_value:
-            rank = planes.rank
-            deviation = _null_deviation(cells, observed, used, boxes[windows[plane]], part, fit, rank)
-        small_boxes = [by_size[size] for size in small.tolist()]
-        differs = has_value and _random_null.differs_from_null(
-            cells, observed, small**planes.rank, mean[plane], small_boxes
-        )
+        dimension = _null_dimension(used, part, by_regression=by_regression)
+        deviation, differs = np.nan, False
+        if np.isfinite(dimension):
+            knots = _knots(used)
+            covariance = _random_null.count_covariance(
+                random_cells,
+                planes.sides,
+                used[knots],
+                [boxes[windows[plane]][knot] for knot in knots],
+                pairs_of,
+            )
+            fit = partial(_null_dimension, used, by_regression=by_regression)
+            deviation = _random_null.dimension_deviation(fit, used, part, knots, covariance)
+            if small.size:
+                small_boxes = [small_contents[place][size] for size in small.tolist()]
+                covariance = _random_null.count_covariance(random_cells, planes.sides, small, small_boxes)
+                expected = random_cells.expected_counts(small_boxes)
+                differs = _random_null.differs_from_null(mean[plane], expected, covariance)
         counts.append(null)
-        rows.append((fit.dimension, deviation, differs))
+        rows.append((dimension, deviation, differs))
     dimension, deviation, differs = np.array(rows, float).T
     return {
         "null_count": np.array(counts),
@@ -391,24 +403,18 @@ def _null(
     }
 
 
-def _null_deviation(
-    cells: int,
-    observed: int,
-    sizes: Array,
-    boxes: list[_random_null.BoxContents],
-    null: Array,
-    fit: Fit,
-    rank: int,
-    *,
-    # the covariance of all pairs; of 100 sizes on 12 sets 48 have a deviation off by -13 to 47 %
-    many: int = 512,
-) -> float:
-    """Return the standard deviation of the null's dimension; of more than `many` sizes some stand for all."""
-    if sizes.size > many:
-        places = np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], many)))
-        sizes, null, boxes = sizes[places], null[places], [boxes[place] for place in places]
-        fit = _scaling_fit.fit_regression(sizes, null)
-    return _random_null.fit_deviation(cells, observed, sizes**rank, boxes, null, fit.weights)
+def _null_dimension(sizes: Array, counts: Array, *, by_regression: bool) -> float:
+    """Return the dimension that the fit finds in counts of boxes of the null."""
+    if by_regression:
+        return _scaling_fit.fit_regression(sizes, counts).dimension
+    return _scaling_fit.fit_steady_ratio(sizes, counts * sizes**2).dimension
+
+
+def _knots(sizes: Array, *, many: int = 20) -> Array:
+    """Return the places of the sizes that carry the covariance: all, or `many` evenly spaced over ln s."""
+    if sizes.size <= many:
+        return np.arange(sizes.size)
+    return np.unique(np.searchsorted(sizes, np.geomspace(sizes[0], sizes[-1], many)))
 
 
 def _notes(fits: list[WindowFit], sizes: Array, *, by_regression: bool) -> dict[str, dict[str, str]]:

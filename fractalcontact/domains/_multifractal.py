@@ -122,8 +122,8 @@ def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Arra
             weight = (observed[size] / _sum_boxes(np.ones(measure.shape), size))[occupied]
         log_mu = np.log(share / share.sum() / weight)
         log_partition[:, place], mean_log_mu[:, place] = _moments(log_mu, weight, orders)
-    tau, tau_spread, _ = _scaling_fit.fit_line(np.log(sizes), log_partition)
-    alpha, alpha_spread, _ = _scaling_fit.fit_line(np.log(sizes), mean_log_mu)  # Chhabra and Jensen (1989)
+    tau, tau_spread = _scaling_fit.fit_line(np.log(sizes), log_partition)
+    alpha, alpha_spread = _scaling_fit.fit_line(np.log(sizes), mean_log_mu)  # Chhabra and Jensen (1989)
     is_one = orders == 1.0  # D_1 = alpha(1), the slope of the entropy
     q_less_1 = np.where(is_one, 1.0, orders - 1.0)
     dimension = np.where(is_one, alpha, tau / q_less_1)
