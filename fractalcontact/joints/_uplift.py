@@ -174,7 +174,7 @@ def uplift(
         fluid_pressure (..., y, x) (Pa, NaN where no water comes). Over (..., diagram), "joint", and between
         parallel sides "linear" and with drains "bilinear": uplift_force (N), mean_uplift (Pa, over the
         nominal area), uplift_arm (m, of its line of action from the upstream side), uplift_x and uplift_y (m,
-        the point where it acts), uplift_profile (Pa).
+        the point where it acts), uplift_profile (Pa, means over each row of cells).
         wet_fraction; isolated_fraction (open, without water); residual (relative); converged; run_time (s).
         If iterated iterations; on a path also effective_stress (Pa), balance_error (of the total stress).
 
@@ -209,7 +209,7 @@ def uplift(
         states = [_opened(opening, flow, soft) for opening in gaps]
     leading = tuple(str(dim) for dim in gap.dims[:-2])
     pressure = np.reshape([low + drop * state.pressure for state in states], gap.shape)
-    knots = _diagrams(flow, (upstream_pressure, low), drain_share)
+    knots = _diagrams(flow, (upstream_pressure, low), drain_share, _drain_place(gap, flow, drains))
     result = _forces(pressure, flow, knots, leading)
     for axis, name in enumerate(("uplift_y", "uplift_x")):
         result[name] = result[name] - _from_edge(gap, axis, 0.0)
@@ -475,20 +475,39 @@ def _balanced(
 Knots = dict[str, tuple[Array, Array]]
 
 
-def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float) -> Knots:
-    """Return distance from the upstream side and pressure at the knots of the diagrams of guidelines."""
+def _drain_place(gap: xr.DataArray, flow: HeldFlow, drains: Any) -> float:
+    """Return the mean distance (m) of the drains from the upstream side, NaN without any."""
+    if drains is None:
+        return math.nan
+    axis, place = flow.sides[0].axis, flow.sides[0].place
+    points = np.asarray(drains, dtype=np.float64).reshape(-1, 2)[:, 1 - axis]  # (x, y)
+    return flow.sense * float((_from_edge(gap, axis, points) - place).mean())
+
+
+def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float, drain: float) -> Knots:
+    """Return distance from the upstream side and pressure at the knots of the diagrams of guidelines.
+
+    The bilinear one breaks at `drain` (m), where the drains are, not at the middle of their cells.
+    """
     (upstream, downstream), (high, low) = flow.sides, ends
     if upstream.axis != downstream.axis:
         return {}
     reach, last = abs(downstream.place - upstream.place), np.sort(flow.distances(both_ends=True))
     knots = {"linear": (np.array([last[0], 0.0, reach, last[1]]), np.array([high, high, low, low]))}
-    rows = np.nonzero(flow.is_drain)[upstream.axis]
-    if rows.size:
-        place = float(flow.distances()[rows].mean())
-        if 0.0 < place < reach:
-            pressure = np.array([high, high, low + share * (high - low), low, low])
-            knots["bilinear"] = np.array([last[0], 0.0, place, reach, last[1]]), pressure
+    if 0.0 < drain < reach:
+        pressure = np.array([high, high, low + share * (high - low), low, low])
+        knots["bilinear"] = np.array([last[0], 0.0, drain, reach, last[1]]), pressure
     return knots
+
+
+def _cell_means(flow: HeldFlow, place: Array, pressure: Array) -> Array:
+    """Return the means over the rows of cells of a pressure that is linear between places (m)."""
+    half = 0.5 * flow.grid.spacing[flow.sides[0].axis]
+    edges = flow.distances()[:, None] + [-half, half]
+    # where the pressure breaks inside a row, it is integrated from edge to break to edge
+    corners = np.clip(place, *np.split(edges, 2, axis=1))
+    at = np.sort(np.concatenate([edges, corners], axis=1), axis=1)
+    return np.asarray(np.trapezoid(np.interp(at, place, pressure), at, axis=1) / (2.0 * half))
 
 
 def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, ...]) -> xr.Dataset:
@@ -508,7 +527,7 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
         centre[axis] = upstream.place + flow.sense * arm
         row = (p[0] * force.sum() / length, arm, *centre)
         rows.append(tuple(np.full_like(mean, value) for value in row))
-        profiles.append(np.broadcast_to(np.interp(flow.distances(), place, p), profile.shape))
+        profiles.append(np.broadcast_to(_cell_means(flow, place, p), profile.shape))
     dims, columns = (*leading, "diagram"), np.stack(rows, -1)
     names = ("mean_uplift", "uplift_arm", "uplift_y", "uplift_x")
     variables: dict[str, Any] = {"uplift_force": (dims, columns[0] * grid.nominal_area)}

@@ -28,33 +28,39 @@ def test_linear_diagram_of_a_dam_of_40_m(make_face):
 
 
 def test_bilinear_diagram_with_a_third_at_the_drains(make_face):
-    line = [(4.0 - 1e-9, y) for y in (0.5, 1.5, 2.5)]
+    """Drains in the middle of their cells, where the flow has them too."""
+    line = [(4.05, y) for y in (0.5, 1.5, 2.5)]
     result = uplift(make_face, np.full((3, 400), 1e-4), (1.0, 0.1), drains=line, drain_pressure=HEAD / 3)
-    per_metre = result.uplift_force / 3
-    # by hand: 4.251 MN/m; the line of cells is half a cell from the stated 4 m
-    np.testing.assert_allclose(per_metre.sel(diagram="bilinear"), 4.251e6, rtol=5e-3)
-    np.testing.assert_allclose(per_metre.sel(diagram="joint"), per_metre.sel(diagram="bilinear"), rtol=1e-4)
-    arms = result.uplift_arm
-    np.testing.assert_allclose(arms.sel(diagram="joint"), arms.sel(diagram="bilinear"), rtol=1e-4)
+    for name in ("uplift_force", "uplift_arm"):
+        joint, bilinear = (result[name].sel(diagram=diagram) for diagram in ("joint", "bilinear"))
+        np.testing.assert_allclose(joint, bilinear, rtol=1e-4)
 
 
 @pytest.mark.parametrize(
     ("share", "force", "arm"),
     [
-        (1 / 3, 4.251e6, 5022.2222 / 433.3333),  # USBR: a third of the difference, 16.67 m of water
-        (0.5 * 36 / 40, 5.3955e6, 6733.3333 / 550.0),  # USACE: half of 50 m (40 - 4)/40, 22.5 m of water
+        (1 / 3, 433.3333, 5022.2222 / 433.3333),  # USBR: a third of the difference, 16.67 m of water
+        (0.5 * 36 / 40, 550.0, 6733.3333 / 550.0),  # USACE: half of 50 m (40 - 4)/40, 22.5 m of water
     ],
 )
-def test_diagrams_of_guidelines_by_hand(make_face, share, force, arm):
-    """50 m of water, a base of 40 m, drains at 4 m: force per metre, and its arm, by two trapezia."""
-    place = 4.05  # the middle of the cell of the drain
-    result = uplift(make_face, np.full((3, 400), 1e-4), (1.0, 0.1), drains=(place, 1.5), drain_share=share)
+@pytest.mark.parametrize("upstream", ["W", "E", "N"])
+@pytest.mark.parametrize("cells", [400, 37])
+def test_diagrams_of_guidelines_by_hand(make_face, share, force, arm, upstream, cells):
+    """50 m of water, a base of 40 m, drains at 4 m: force per metre, and its arm, by two trapezia.
+
+    The diagram breaks at the drains, not at the middle of their cell. `force` is in metres of water.
+    """
+    spacing = 40 / cells
+    gap, steps = np.full((3, cells), 1e-4), (1.0, spacing)
+    at = (4.0 if upstream == "W" else 36.0, 1.0)
+    if upstream == "N":
+        gap, steps, at = gap.T, steps[::-1], at[::-1]
+    result = uplift(make_face, gap, steps, drains=at, drain_share=share, upstream=upstream)
     bilinear = result.sel(diagram="bilinear")
-    np.testing.assert_allclose(bilinear.uplift_force / 3, force, rtol=5e-3)
-    np.testing.assert_allclose(bilinear.uplift_arm, arm, rtol=5e-3)
-    low = share * 50
-    exact = 9.81e3 * ((50 + low) / 2 * place + low / 2 * (40 - place))
-    np.testing.assert_allclose(bilinear.uplift_force / 3, exact, rtol=1e-12)
+    np.testing.assert_allclose(bilinear.uplift_force / 3, 9.81e3 * force, rtol=1e-7)
+    np.testing.assert_allclose(bilinear.uplift_arm, arm, rtol=1e-7)
+    profile = bilinear.uplift_profile.values
+    np.testing.assert_allclose(profile.sum() * spacing, 9.81e3 * force, rtol=1e-7)
 
 
 def test_lines_inside_the_plane(make_face):
