@@ -100,6 +100,15 @@ def area_by_resolution(
     InvalidInput
         The block would leave its face, `factors` do not divide it, or an argument is wrong.
 
+    Notes
+    -----
+    Heights are kept as a coarser scan would read them: means over blocks of them would blunt the asperities,
+    and gave six surfaces with H = 0.8 a dimension lower by 0.1. A scan begins somewhere: kept are the first
+    of every so many heights from the south-west corner. No grid of an even factor is its own mirror image, so
+    that the mirrored crack, whose kept heights are others, has another area. Over all grids of 128 x 128
+    heights it scattered by 5, 10 and 17 % at the factors 2, 4 and 8, and the dimension of these factors by
+    0.09; compare dimensions of several surfaces or scans.
+
     References
     ----------
     Borri-Brunetto, Carpinteri and Chiaia (1998), FRAMCOS-3, section 4 and figure 3b.
