@@ -97,15 +97,7 @@ def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:
 
 def _methods(names: list[str]) -> Family:
     """Return a family of curves with a colour and a marker for each method."""
-    colours = _style.cycle()
-    styles = [
-        {
-            "color": colours[i % len(colours)],
-            "marker": MARKERS[i % len(MARKERS)],
-            "ls": "-" if i < len(colours) else "--",
-        }
-        for i in range(len(names))
-    ]
+    styles = [_style.distinct_style(i) | {"marker": MARKERS[i % len(MARKERS)]} for i in range(len(names))]
     return Family(styles, [name.replace("_", " ") for name in names])
 
 

@@ -62,9 +62,7 @@ def ordered(labels: Sequence[str], name: str = "", unit: str = "", count: int | 
 
 def distinct(labels: Sequence[str], heading: str = "") -> Family:
     """Return a family whose colours have no order."""
-    colours = _style.cycle()
-    styles = [{"color": colours[i % len(colours)]} for i in range(len(labels))]
-    return Family(styles, labels, heading=heading)
+    return Family([_style.distinct_style(i) for i in range(len(labels))], labels, heading=heading)
 
 
 @dataclass

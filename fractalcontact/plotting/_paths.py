@@ -234,8 +234,7 @@ def direction_style(name: str, number: int) -> dict[str, Any]:
     if name in _style.DIRECTION_COLOURS:
         return {"color": _style.DIRECTION_COLOURS[name], "ls": _style.DIRECTION_LINES[name]}
     colours = [colour for colour in _style.cycle() if colour not in _style.DIRECTION_COLOURS.values()]
-    cycle, index = divmod(number, len(colours))
-    return {"color": colours[index], "ls": ("-", "--", "-.", ":")[cycle % 4]}
+    return _style.distinct_style(number, colours)
 
 
 def direction_name(name: str) -> str:

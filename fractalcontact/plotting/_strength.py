@@ -62,7 +62,10 @@ def strength_envelope(
     authors = distinct([" and ".join(part.capitalize() for part in each) for each in parts])
     panel = LinePanel.of(ax, data, pressure, strength, dims, authors, points=0)
     in_range = panel.values("in_range") > 0
-    panel.curves("", **_style.DOTTED)
+    out = ~in_range  # with the last points in range, from which the dots begin
+    out[:, 1:] |= ~in_range[:, :-1]
+    out[:, :-1] |= ~in_range[:, 1:]
+    panel.curves("", np.where(out, strength.values, np.nan), **_style.DOTTED)
     panel.curves("in range", np.where(in_range, strength.values, np.nan))
     if not in_range.all():
         panel.key("out of range", **_style.DOTTED)

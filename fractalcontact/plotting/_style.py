@@ -187,6 +187,17 @@ def cycle() -> tuple[Any, ...]:
     return (*COLOURS, ink())
 
 
+def distinct_style(number: int, colours: Sequence[Any] | None = None) -> dict[str, Any]:
+    """Return colour and dashes of one of several curves: each colour solid, then dashed, then dash-dotted.
+
+    Dots are left to parts of these curves, such as those out of range.
+    """
+    colours = colours or cycle()
+    turn, index = divmod(number, len(colours))
+    solid, dashed, _, dash_dotted = LINES
+    return {"color": colours[index], "ls": (solid, dashed, dash_dotted)[turn % 3]}
+
+
 def style_axes(ax: Axes) -> None:
     """Keep the style of the moment, which matplotlib would look up again when the figure is rendered."""
     import matplotlib

@@ -27,7 +27,9 @@ def test_curves_are_the_strengths_in_order_of_the_stress(result):
     ordered = result.sortby("nominal_pressure")
     for name in result.criterion.values:
         one = ordered.sel(criterion=name)
-        assert holds(drawn(ax), one.nominal_pressure, one.shear_strength)
+        # dots join what is out of range to the nearest point in range
+        beside = ~one.in_range.rolling(nominal_pressure=3, center=True, min_periods=1).min().astype(bool)
+        assert holds(drawn(ax), one.nominal_pressure, one.shear_strength.where(beside))
         assert holds(drawn(ax), one.nominal_pressure, one.shear_strength.where(one.in_range))
     assert not result.in_range.all()
     labels = [text.get_text() for legend in figure.findobj(type(ax.artists[0])) for text in legend.texts]
@@ -42,3 +44,18 @@ def test_axes_start_at_zero_and_share_their_unit(result):
     assert ax.get_xlabel().endswith("(MPa)")
     assert ax.get_ylabel().endswith("(MPa)")
     assert np.isfinite(ax.get_ylim()).all()
+
+
+def test_every_criterion_has_a_style_of_its_own(result):
+    """Eight criteria, seven colours: the eighth is dashed, and none is dotted as what is out of range."""
+    many = result.isel(criterion=np.arange(8) % result.criterion.size)
+    many = many.assign_coords(criterion=[f"author{chr(ord('a') + i)}" for i in range(8)])
+    ax = plotting.strength_envelope(many)
+    styles = {
+        line.get_label(): (line.get_color(), line.get_linestyle(), line.is_dashed())
+        for line in ax.lines
+        if line.get_label().startswith("in range")
+    }
+    assert len(styles) == len(set(styles.values())) == 8
+    assert not {":"} & {line for _, line, _ in styles.values()}
+    render(figure_of(ax))
