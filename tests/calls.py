@@ -8,7 +8,6 @@ wrong arguments, missing numbers, threads and processes, damaged arguments. A ne
 import functools
 import importlib
 import inspect
-import re
 import tempfile
 from pathlib import Path
 
@@ -17,7 +16,7 @@ import skimage as ski
 import xarray as xr
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.plotting._draw import KINDS
 
 SPACING = 1e-4
 PLACE = Path(tempfile.gettempdir()) / "fractalcontact_calls"
@@ -282,25 +281,9 @@ def function_of(name):
     return functools.partial(getattr(module, word), kind=kind) if kind else getattr(module, word)
 
 
-@functools.cache
-def figure_kinds():
-    """Return the kinds of figures, as `plot` names them where it refuses another."""
-    return _words_of_the_refusal(overview(), "no such kind")[1]
-
-
-def options_of(result, kind=None):
-    """Return the kind of figure that `plot` draws of a result, and the names of the options of that kind."""
-    return _words_of_the_refusal(result, kind, no_such_option=None)
-
-
-def _words_of_the_refusal(*arguments, **options):
-    """Return what `plot` refuses, and the words that it expects there."""
-    try:
-        fc.plotting.plot(*arguments, **options)
-    except InvalidInput as refusal:
-        place, _, expected = refusal.problems[0].partition(": expected one of ")
-        return place.removeprefix("options of "), re.findall(r"'(\w+)'", expected.partition(", got ")[0])
-    raise AssertionError("plot takes any word")
+def options_of(kind):
+    """Return the names of the options of a kind of figure."""
+    return list(inspect.signature(KINDS[kind][0]).parameters)[1:]
 
 
 def figure_name(kind):
@@ -310,7 +293,7 @@ def figure_name(kind):
 
 def _named_alike():
     """Yield the call of every figure with the name of a function, if it has none: with its result."""
-    for kind in figure_kinds():
+    for kind in KINDS:
         source = next((f"{each}.{kind}" for each in SUBPACKAGES if f"{each}.{kind}" in CALLS), None)
         name = figure_name(kind)
         if source is not None and name not in CALLS:

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
-from calls import CALLS, figure_kinds, figure_name, function_of, options_of, overview
+from calls import CALLS, KINDS, figure_name, function_of, options_of
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
@@ -16,7 +16,7 @@ from plotting_figures import figure_of
 from fractalcontact import plotting
 from fractalcontact.base.errors import InvalidInput
 
-FIGURES = figure_kinds()
+FIGURES = list(KINDS)
 
 
 def draw(name, **options):
@@ -31,7 +31,7 @@ def panels(drawn):
 
 @pytest.mark.parametrize("name", FIGURES)
 def test_takes_axes(name):
-    assert len({"ax", "axes"} & set(options_of(overview(), name)[1])) == 1
+    assert len({"ax", "axes"} & set(options_of(name))) == 1
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -47,7 +47,7 @@ def test_axes_are_returned_and_readable_in_a_dark_style(name):
     sheet = Figure(figsize=(12, 12))
     projection = {"projection": "polar" if is_polar else None}
     axes = sheet.subplots(1, panels(drawn).size, squeeze=False, subplot_kw=projection).ravel()
-    is_single = "ax" in options_of(overview(), name)[1]
+    is_single = "ax" in options_of(name)
     again = draw(name, **({"ax": axes[0]} if is_single else {"axes": axes}))
     assert np.array_equal(panels(again), axes)
     assert plt.get_fignums() == []
