@@ -49,8 +49,8 @@ BULK = {
 }
 LOADS = ("closure", "normal_force", "nominal_pressure")
 CONTACT_OPTIONS = ("influence", "disc_radius", "hardness", "tolerance", "method")
-# bytes of a cell: the solver of a free body with the steps before (188), delta-surface and flat block
-PRESSING_BYTES = 228.0
+# bytes of a cell: the solver of a free body with the steps before (196), delta-surface and flat block
+PRESSING_BYTES = 236.0
 
 
 @dataclass(frozen=True)
