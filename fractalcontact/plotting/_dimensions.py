@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -114,6 +114,7 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
         problems.require(curve[scale].ndim == 1, "result", f"{scale} along one dim", curve[scale].dims)
     dims = curve[scale].dims
     x, y = quantity(curve, scale, dims), quantity(curve, value, dims)
+    y = replace(y, width=28)  # the upper panel has two thirds of the height
     slopes = table(curve, "local_slope", dims) if "local_slope" in curve else np.full(y.values.shape, np.nan)
     style = {"color": _style.BLUE, "marker": "." if x.values.size <= _style.MOST_DOTS else ""}
     above, below = LinePanel(upper, x, y), LinePanel(lower, x, Quantity(slopes, PLAIN, "local slope"))
@@ -128,7 +129,6 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     below.finish(log="x", empty="")
     upper.set_title(name.replace("_", " "))
     upper.set_xlabel("")
-    upper.set_ylabel(textwrap.fill(upper.get_ylabel(), 28))  # two thirds of a figure high
     upper.tick_params(labelbottom=False)
 
 

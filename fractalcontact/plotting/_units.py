@@ -135,11 +135,15 @@ def name_of(data: xr.DataArray) -> str:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Values (SI) to show on an axis, with the scale and the name that they have there."""
+    """Values (SI) to show on an axis, with the scale and the name that they have there.
+
+    A label has `width` characters in a line: 44 of 9 points are 2.9 inches, the height of a panel in a row.
+    """
 
     values: Array
     scale: Scale
     name: str
+    width: int = 44
 
     @property
     def shown(self) -> Array:
@@ -148,8 +152,7 @@ class Quantity:
 
     def label(self, axis: Any) -> None:
         """Label an axis; its unit can be read with `axis.get_units()`."""
-        # 44 characters of 9 points are 2.9 inches, the height of a panel in a row
-        axis.set_label_text(textwrap.fill(self.scale.label(self.name), 44))
+        axis.set_label_text(textwrap.fill(self.scale.label(self.name), self.width))
         name = axis.axis_name
         shared = axis.axes.get_shared_x_axes() if name == "x" else axis.axes.get_shared_y_axes()
         for ax in shared.get_siblings(axis.axes):
