@@ -175,6 +175,7 @@ def axis_faults(array: xr.DataArray | xr.Dataset, dim: str, name: str) -> Iterat
         yield name, f"a spacing of {_LENGTHS}", f"{spacing:g}"
     else:
         distance = np.abs(centres - (centres[0] + spacing * np.arange(n))).max()
+        # far from the origin places are rounded: as given, as computed, and at both ends, for the spacing
         if not distance <= UNIFORM * spacing + 4.0 * np.spacing(np.abs(centres).max()):
             yield name, "uniform spacing", f"centres up to {distance / spacing:.3g} spacings off their place"
 

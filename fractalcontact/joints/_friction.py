@@ -317,7 +317,7 @@ def _shears(curve: xr.DataArray | xr.Dataset) -> Array:
 def _dependence(secants: xr.DataArray, negligible: float = 1.0) -> str:
     """Return how the peak depends on the distance, from the two shortest that the shears resolve.
 
-    A change of so many degrees is as good as none.
+    A change of so many degrees is as good as none, a choice: friction angles are quoted in whole degrees.
     """
     greatest = secants.max("shear").transpose("distance", ...)
     peaks = greatest.where(greatest < 90.0).values.reshape(greatest.sizes["distance"], -1)

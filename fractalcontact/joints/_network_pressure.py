@@ -60,7 +60,8 @@ def pressures(
     No pressure leaves the range of those that are held. The error is the relative residual, by how much the
     solution left that range, or by how much it dissipates more than an even gradient along `axis` (Dirichlet:
     the true pressure dissipates least), whichever is most. `inside` are whole clusters of open cells, and
-    `order` all cells as elimination takes them, which is faster than multigrid up to `largest_direct` cells.
+    `order` all cells as elimination takes them, which is faster than multigrid up to `largest_direct` cells:
+    384 x 384 of a rough opening took 1.3 and 2.5 s, 512 x 512 2.4 and 3.1 s, 700 x 700 5.4 and 4.9 s.
     """
     from scipy.sparse import coo_array, diags_array
 
@@ -249,7 +250,8 @@ def _conjugate_gradients(
         Relative error of the flow, in the norm of the preconditioner. With 1e-9 pressures behind narrow
         openings were off by up to .02 in four gaps of 192 x 192 cells, with 1e-12 by .002.
     tolerance : float
-        Of the relative residual, which must be reached as well, and of the range of the pressures.
+        Of the relative residual, which must be reached as well, and of the range of the pressures. With 1e-4
+        pressures of two rough openings of 300 x 300 cells were off by 1e-4, with 1e-6 by 4e-7, in equal time.
     max_iterations : int
         Then elimination takes over; rough faces of 700 x 700 cells took 11.
     """

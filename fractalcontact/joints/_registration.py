@@ -39,6 +39,7 @@ def _check(problems: Problems) -> None:
     grid, other = read_grid(given.lower), read_grid(given.upper)
     for axis, name in enumerate(("y", "x")):
         step, step_upper = grid.spacing[axis], other.spacing[axis]
+        # along the whole face the places of both may part by 1e-4 of a cell
         if abs(step_upper - step) * other.shape[axis] > UNIFORM * step * 100:
             problems.add(f"upper.{name}", f"the spacing of lower, {step:g} m", f"{step_upper:g} m")
     for argument, face in (("lower", given.lower), ("upper", given.upper)):

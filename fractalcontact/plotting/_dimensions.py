@@ -135,7 +135,7 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
 def _slope_limits(ax: Axes, slopes: Any, clipped: float = 10.0) -> None:
     """Limit the axis so that noise at the ends of a curve does not compress the rest.
 
-    So many per cent of the slopes at either end may lie outside it.
+    So many per cent of the slopes at either end may lie outside it: of 20 the two lowest and the two highest.
     """
     finite = slopes[np.isfinite(slopes)]
     if finite.size:

@@ -242,7 +242,10 @@ def _units_of(data: Any) -> str:
 
 
 def column_scale(data: Any) -> Scale | None:
-    """Return one unit for a column of a table; None, each value its own, where they span three decades."""
+    """Return one unit for a column of a table; None, each value its own, where they span three decades.
+
+    A prefix spans so many: in the unit of the greatest value the least would have none of its digits.
+    """
     sizes = np.abs(finite(data))
     sizes = sizes[sizes > 0]
     if sizes.size == 0 or sizes.max() >= 1e3 * sizes.min():

@@ -390,5 +390,5 @@ def implausible_result(name: str, result: xr.Dataset) -> Iterator[str]:
     edge = float(result["nominal_area"].max()) ** 0.5
     if "closure" in result and np.isfinite(result["closure"].values).any():
         deepest = float(np.nanmax(result["closure"].values))
-        if deepest > 0.5 * edge:
+        if deepest > 0.5 * edge:  # half-spaces describe closures that are small against the body
             yield f"{name}: a closure of {deepest:.3g} m of a body {edge:.3g} m wide; is the modulus in Pa?"
