@@ -106,16 +106,6 @@ def dct(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
     return _scipy().dctn(array, type=transform_type, axes=axes, workers=_scipy_threads())  # type: ignore[no-any-return]
 
 
-def dst(array: Array, transform_type: int, axes: tuple[int, ...]) -> Array:
-    """Return the sine transform along `axes`, without normalisation.
-
-    Type 1, with n - 1 values a_1 to a_{n-1}, sums 2 a_j sin(pi k j / n) for k = 1 to n - 1.
-    """
-    if library() == "ducc0":
-        return _axis_by_axis(_ducc0().dst, array, axes, type=transform_type)
-    return _scipy().dstn(array, type=transform_type, axes=axes, workers=_scipy_threads())  # type: ignore[no-any-return]
-
-
 def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None) -> Array:
     """Transform a real plane (ny, nx) padded with zeros to (my, mx): to (my, mx//2 + 1).
 

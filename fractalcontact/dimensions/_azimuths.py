@@ -25,17 +25,13 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.spectra import half_wavenumbers
 from fractalcontact.dimensions._gaussian_mixture import Bins, mixture, spread_nodes
-from fractalcontact.dimensions._metric_spectrum import (
-    LARGEST_LOG_RATIO,
-    MetricSpectrum,
-    gaussian_tables,
-)
+from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, MetricSpectrum, gaussian_tables
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
     PER_OCTAVE,
+    Filling,
     clear_modes,
-    fill,
     joined_classes,
     log_means,
 )
@@ -90,8 +86,11 @@ class PlaneModes:
     def __init__(self, shape: tuple[int, int], dy: float, is_periodic: bool) -> None:
         self.dy, self.is_periodic = dy, is_periodic
         self.shape = shape if is_periodic else (shape[0] - 2, shape[1] - 2)
-        self.tapers = [np.ones(n) if is_periodic else _taper(n) for n in self.shape]
-        self.information = math.prod(np.mean(w**2) ** 2 / np.mean(w**4) for w in self.tapers)
+        tapers = [_taper(n, 0.0 if is_periodic else _TAPERED) for n in self.shape]
+        self.taper = np.outer(*tapers)
+        self.information = math.prod(1.0 / (w.size * np.sum(w**4)) for w in tapers)
+        padded = [np.pad(w, (0, w.size)) for w in tapers]
+        self.overlaps = [fft.irfft(np.square(np.abs(fft.rfft(w))) + 0j, w.size) for w in padded]
         self.y, self.x = self._wavenumbers(1)
         # one of each pair of conjugates, without those of two spacings, of which some are real
         self.half = (np.abs(self.y) * dy < np.pi - 1e-9) & (self.x < np.pi - 1e-9)
@@ -105,12 +104,11 @@ class PlaneModes:
         """Return the squared modes of complete heights."""
         z = heights
         if not self.is_periodic:
-            inner = z[1:-1, 1:-1]
-            down = (z[2:, 1:-1] + z[:-2, 1:-1] - 2.0 * inner) / self.dy**2
-            z = down + z[1:-1, 2:] + z[1:-1, :-2] - 2.0 * inner
-        modes = fft.rfft2(z * self.tapers[0][:, None] * self.tapers[1])
-        power = np.square(modes.real) + np.square(modes.imag)
-        return np.asarray(power / math.prod(w @ w for w in self.tapers))
+            twice = 2.0 * z[1:-1, 1:-1]
+            down = (z[2:, 1:-1] + z[:-2, 1:-1] - twice) / self.dy**2
+            z = down + z[1:-1, 2:] + z[1:-1, :-2] - twice
+        modes = fft.rfft2(z * self.taper)
+        return np.asarray(np.square(modes.real) + np.square(modes.imag))
 
     def filtered(self, density: Array | float, y: Array, x: Array) -> Array:
         """Return the density of what is transformed: of the heights, or of their Laplacian."""
@@ -126,12 +124,12 @@ class PlaneModes:
         density[0, 0] = 0.0
         expected, clean = np.maximum(density, 1e-300), density[::factor, ::factor]
         if not self.is_periodic:
-            ny, nx = (2 * n for n in self.shape)
-            lags = fft.irfft2(density.astype(complex), (ny, nx))
-            for w, axis in zip(self.tapers, ((slice(None), None), (None, slice(None))), strict=True):
-                overlap = fft.irfft(np.square(np.abs(fft.rfft(np.pad(w, (0, w.size))))) + 0j, 2 * w.size)
-                lags *= (overlap / (w @ w))[axis]
-            expected = np.maximum(fft.rfft2(lags).real[::2, ::2], 1e-300)
+            (ny, nx), (along_y, along_x) = self.shape, self.overlaps
+            lags = fft.irfft2(density.astype(complex), (2 * ny, 2 * nx), overwrite=True)
+            lags *= along_y[:, None]
+            # every second mode is one of the sum over periods
+            lags = (lags[:ny] + lags[ny:]) * along_x
+            expected = np.maximum(fft.rfft2(lags[:, :nx] + lags[:, nx:]).real, 1e-300)
         if spectrum.theta[SPREAD] == 0.0:
             return expected, clean, clean
         sharp = np.where(np.arange(spectrum.theta.size) == SPREAD, 0.0, spectrum.theta)
@@ -139,12 +137,13 @@ class PlaneModes:
         return expected, clean, self.filtered(unblurred, self.y, self.x)
 
 
-def _taper(n: int) -> Array:
-    """Return a taper that rises as a sine at both ends."""
-    number = round(_TAPERED * n)
+def _taper(n: int, share: float) -> Array:
+    """Return a taper that rises as a sine over a share of both ends; its squares sum to one."""
+    number = round(share * n)
     taper = np.ones(n)
     taper[:number] = np.sin(0.5 * np.pi * (np.arange(number) + 0.5) / max(number, 1))
-    return np.minimum(taper, taper[::-1])
+    taper = np.minimum(taper, taper[::-1])
+    return np.asarray(taper / math.sqrt(taper @ taper))
 
 
 def _rings(lnq: Array) -> Array:
@@ -152,10 +151,16 @@ def _rings(lnq: Array) -> Array:
     return np.asarray((lnq - lnq.min(initial=np.inf)) * (PER_OCTAVE / math.log(2.0)) + 1e-9).astype(int)
 
 
+def _numbered(values: Array) -> tuple[Array, Array]:
+    """Return the whole numbers that are there, ascending, and the place of each value among them."""
+    is_there = np.bincount(values) > 0
+    return np.flatnonzero(is_there), np.cumsum(is_there)[values] - 1
+
+
 def _shortest(modes: PlaneModes, power: Array) -> float:
     """Return the shortest wavelength before a cut-off, beyond which there is only leakage; 0 without one."""
     q = np.hypot(modes.y, modes.x)[modes.half]
-    ring = np.unique(_rings(np.log(q)), return_inverse=True)[1]
+    ring = _numbered(_rings(np.log(q)))[1]
     density = power[modes.half] / np.maximum(modes.filtered(1.0, modes.y, modes.x)[modes.half], 1e-300)
     mean = np.bincount(ring, density) / np.bincount(ring)
     falls = np.flatnonzero(mean[PER_OCTAVE:] < _CUT_OFF * mean[:-PER_OCTAVE])
@@ -186,19 +191,20 @@ class Classes:
         lnq = np.log(q[keep])
         ring = _rings(lnq)
         ring = joined_classes(np.bincount(ring))[ring].astype(int)
-        self.number_of_modes, self.keep, self.expected = lnq.size, keep, expected[keep]
+        self.places, self.expected = np.flatnonzero(keep), expected[keep]
         self.rings = int(ring.max(initial=0)) + 1
         rows, columns = np.nonzero(keep)
         y, x = modes.y[rows, 0], modes.x[columns]
         sector = np.rint(np.arctan2(y, x) * (SECTORS / np.pi)).astype(int) % SECTORS
-        present, self.number = np.unique(ring * SECTORS + sector, return_inverse=True)
+        present, self.number = _numbered(ring * SECTORS + sector)
         self.ring, self.sector = np.divmod(present, SECTORS)
         self.count = np.bincount(self.number).astype(float)
-        self.information = np.full(present.shape, modes.information)
+        self.information = np.full(self.count.shape, modes.information)
         self.level = self.means(power)
         self.lnq = np.bincount(self.number, lnq) / self.count
         # some modes of each class, evenly by their wavenumber
-        order, ends = np.lexsort((lnq, self.number)), np.cumsum(self.count).astype(int)
+        order, ends = np.argsort(lnq, kind="stable"), np.cumsum(self.count).astype(int)
+        order = order[np.argsort(self.number[order].astype(np.int16), kind="stable")]  # by class: few digits
         size = np.minimum(self.count, _SAMPLE).astype(int)
         self.first = np.cumsum(size) - size
         within = (np.arange(size.sum()) - np.repeat(self.first, size) + 0.5) / np.repeat(size, size)
@@ -208,7 +214,7 @@ class Classes:
 
     def means(self, power: Array) -> Array:
         """Return the mean of a power over that expected, for each class."""
-        return np.asarray(np.bincount(self.number, power[self.keep] / self.expected) / self.count)
+        return np.asarray(np.bincount(self.number, power.ravel()[self.places] / self.expected) / self.count)
 
     def corrected(self, before: Array, after: Array) -> None:
         """Correct for gaps, by the levels of Gaussian surfaces before and after filling: (surfaces, classes).
@@ -302,14 +308,10 @@ class Classes:
         share = 1.0 / (variance * total[self.ring])
         weight = np.repeat(share / self.size, self.size) / self._before
         starts = self.first[np.flatnonzero(np.diff(self.ring, prepend=-1))]
-
-        def mean(values: Array) -> Array:
-            return np.add.reduceat(values * weight, starts, axis=-1)
-
-        tables = gaussian_tables(t, spreads, spectrum.metric, self.sample, modes.dy, mean)
+        tables = gaussian_tables(t, spreads, spectrum, *self.sample, weight, starts)
         lnq = self.by_ring(self.lnq, self.count)
         level = self.by_ring(logs, share)
-        return Bins(level, 1.0 / total, tables, nodes, t, mean(np.ones(weight.size)), lnq, extent, 2)
+        return Bins(level, 1.0 / total, tables, nodes, t, np.add.reduceat(weight, starts), lnq, extent, 2)
 
     def along(self, spectrum: MetricSpectrum, azimuths: Array) -> Array:
         """Fit amplitude and exponent to all waves, and to those about azimuths (degree).
@@ -354,7 +356,7 @@ class Classes:
         """
         from scipy.special import chdtrc
 
-        lower = np.linalg.cholesky(np.linalg.inv(spectrum.metric))
+        lower = np.linalg.cholesky(spectrum.inverse)
         azimuth = np.pi / SECTORS * self.sector
         across = lower[0, 0] * np.sin(azimuth) + lower[1, 0] * np.cos(azimuth)
         azimuth = np.arctan2(across, lower[1, 1] * np.cos(azimuth))
@@ -426,7 +428,7 @@ def fit_azimuths(
 
     def classes_of(spectrum: MetricSpectrum) -> Classes | None:
         classes = Classes(modes, power, spectrum, band)
-        if classes.number_of_modes < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
+        if classes.places.size < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
             return None
         if not first.is_complete:
             classes.corrected(*_filled_levels(classes, observed))
@@ -481,16 +483,16 @@ def fit_azimuths(
 
 def _filled_levels(classes: Classes, observed: Array) -> tuple[Array, Array]:
     """Return the levels of Gaussian surfaces with the spectrum of the classes before and after filling."""
-    stream, modes = np.random.default_rng(1), classes.modes
+    stream, modes, filling = np.random.default_rng(1), classes.modes, Filling(observed)
     ny, nx = observed.shape
     y, x = half_wavenumbers((2 * ny, 2 * nx), (modes.dy, 1.0))
     root = np.sqrt(classes.spectrum.with_noise(y[:, None], x))
     root[0, 0] = 0.0
-    levels = []
+    levels: list[list[Array]] = []
     for _ in range(2):
-        heights = fft.irfft2(fft.rfft2(stream.standard_normal((2 * ny, 2 * nx))) * root, (2 * ny, 2 * nx))
-        for part in (heights[:ny, :nx], heights[ny:, nx:], heights[:ny, nx:], heights[ny:, :nx]):
-            filled = fill(np.where(observed, part, np.nan))
-            levels.append([np.maximum(classes.means(modes.power(z)), 1e-300) for z in (part, filled)])
-    before, after = np.moveaxis(np.array(levels), 1, 0)
+        white = fft.rfft2(stream.standard_normal((2 * ny, 2 * nx)))
+        heights = fft.irfft2(white * root, (2 * ny, 2 * nx), overwrite=True)
+        parts = heights[:ny, :nx], heights[ny:, nx:], heights[:ny, nx:], heights[ny:, :nx]
+        levels += [[classes.means(modes.power(z)) for z in (part, filling(part))] for part in parts]
+    before, after = np.maximum(np.moveaxis(np.array(levels), 1, 0), 1e-300)
     return before, after

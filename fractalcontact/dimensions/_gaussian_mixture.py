@@ -39,6 +39,9 @@ _CUBICS = np.array([[0, 6, 0, 0], [-2, -3, 6, -1], [3, -6, 3, 0], [-1, 3, -3, 1]
 # of the spreads of a table: of a first fit, and of the posterior. Near the axes the power of a blur ends at
 # that of the edges, where a cubic needs short steps
 _SPREAD_STEPS = 0.25, 0.1
+# Exponent below which a Gaussian does not count: far below rounding, yet no product of two is denormal, with
+# which processors are ten times slower
+FADED = -100.0
 FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
 
 
@@ -53,7 +56,7 @@ def weights(
     """Return the weights of the Gaussians for heights of unit rms increment over one x spacing, (..., t).
 
     The last one holds all shorter Gaussians, of which `terms` are summed and the others form a geometric
-    series. `hurst` and `spread` have one shape, or are numbers.
+    series.
     """
     h = np.asarray(hurst)[..., None]
     ratio, blur = 2.0**-h, 4.0 * t[-1] * np.square(spread)[..., None]
@@ -64,43 +67,54 @@ def weights(
     # over its own term: without aliases a Gaussian counts by its density, 2^(-d / 2) of the one before
     number = np.arange(terms + 1.0)
     if form == UNALIASED:
-        share, falls = 2.0 ** (-0.5 * axes * number), np.full(h.shape, 0.5 * axes)
+        share, falls = 2.0 ** (-0.5 * axes * number), np.full(1, 0.5 * axes)
     else:
         blur = np.zeros_like(blur) if form == FILTERED else blur
         share = ((1.0 + blur) / (1.0 + blur * 2.0**number)) ** (0.5 * axes)
         falls = np.where(blur > 0.0, 0.5 * axes, 0.0)
     series = ratio**number * share
     rest = series[..., -1:] / (1.0 - 2.0 ** -(h + falls))
-    weight[..., -1:] *= series[..., :-1].sum(axis=-1, keepdims=True) + rest
-    return np.asarray(0.5 * weight / unit)
+    last = series[..., :-1].sum(axis=-1, keepdims=True) + rest
+    return np.asarray(0.5 * np.where(np.arange(t.size) < t.size - 1, weight, weight * last) / unit)
 
 
 @lru_cache
-def _width(spread: float) -> float:
-    """Return the width w of the Gaussian weights exp(-u^2 / (2 w^2)) of whole u with a standard deviation."""
-    if spread > _SUM_OF_WAVES:
-        return spread
+def _point_weights(spread: float) -> Array:
+    """Return Gaussian weights exp(-u^2 / (2 w^2)) of u = 1 ... 8 that have a standard deviation, at most
+    `_SUM_OF_WAVES`.
+    """
     u, widths = np.arange(9.0), np.geomspace(0.1, _SUM_OF_WAVES + 0.1, 300)
     weights = np.exp(-0.5 * np.square(u / widths[:, None]))
     variances = weights @ np.square(u) / (weights.sum(axis=1) - 0.5)
-    return float(np.interp(spread, np.sqrt(variances), widths))
+    width = np.interp(spread, np.sqrt(variances), widths)
+    return np.asarray(np.exp(-0.5 * np.square(u[1:] / width)))
 
 
-def kernel_transfer(spread: float, q: Array) -> Array:
-    """Return the transfer function of Gaussian weights with the standard deviation `spread`.
+class AxisBlur:
+    """Blurs along one axis: their transfer functions at some wavenumbers.
 
-    The sum over points equals one over waves (Poisson): the shorter of the two is used.
+    Parameters
+    ----------
+    q : ndarray
+        Wavenumbers, radians per point.
     """
-    if spread == 0.0:
-        return np.ones(q.shape)
-    width = _width(spread)
-    if width < _SUM_OF_WAVES:
-        u = np.arange(1.0, 9.0)
-        weights = np.exp(-0.5 * np.square(u / width))
-        return np.asarray((1.0 + 2.0 * weights @ np.cos(np.outer(u, q))) / (1.0 + 2.0 * weights.sum()))
-    turns = 2.0 * np.pi * np.arange(-2.0, 3.0)
-    waves = sum(np.exp(-0.5 * np.square(width * (q + turn))) for turn in turns)
-    return np.asarray(waves / np.sum(np.exp(-0.5 * np.square(width * turns))))
+
+    def __init__(self, q: Array) -> None:
+        self.waves = q + np.array([0.0, -2.0 * np.pi, 2.0 * np.pi])[:, None]
+        self.cosines = np.cos(np.outer(np.arange(1.0, 9.0), q))
+
+    def transfers(self, spread: float) -> tuple[Array, Array]:
+        """Return the transfer functions of a Gaussian blur and of Gaussian weights of points, `spread` in
+        points.
+
+        The first is that of the wavenumbers and their nearest aliases, shape (3, q). The second is a sum over
+        points, which equals one over waves (Poisson): the shorter of the two is used.
+        """
+        blur = np.exp(-0.5 * np.square(spread * self.waves))
+        if spread > _SUM_OF_WAVES:
+            return blur, blur.sum(axis=0) / (1.0 + 2.0 * math.exp(-0.5 * (2.0 * np.pi * spread) ** 2))
+        weights = _point_weights(spread)
+        return blur, (1.0 + 2.0 * weights @ self.cosines) / (1.0 + 2.0 * weights.sum())
 
 
 class AxisModes:
@@ -115,24 +129,22 @@ class AxisModes:
     """
 
     def __init__(self, t: Array, q: Array) -> None:
-        self.t, self.q = t, q
-        self.waves = [q + turn for turn in (0.0, -2.0 * np.pi, 2.0 * np.pi)]
+        self.t, self.blur = t, AxisBlur(q)
         root, inverse = np.sqrt(np.pi / t)[:, None], -0.25 / t[:, None]
-        self.images = [root * np.exp(np.square(wave) * inverse) for wave in self.waves]
-        self.cosines = np.cos(np.outer(np.arange(1.0, 5.0), q))
+        self.images = [root * np.exp(np.square(wave) * inverse) for wave in self.blur.waves]
+        self.sampled = self.densities(0.0)[ALIASED]  # without a blur
 
-    def densities(self, spread: float) -> tuple[Array, Array]:
-        """Return the densities after a blur, with aliases and without, shape (t, q); `spread` in points."""
-        blurs = [np.exp(-np.square(spread * wave)) for wave in self.waves]
+    def densities(self, spread: float) -> tuple[Array, Array, Array]:
+        """Return the densities after a blur for each form, shape (t, q); `spread` in points."""
+        blurs, weights = (np.square(transfer) for transfer in self.blur.transfers(spread))
         unaliased, left, right = (image * blur for image, blur in zip(self.images, blurs, strict=True))
         aliased = unaliased + left + right
         # for narrow Gaussians the sum over the points is shorter than that over the waves
         wider = 1.0 + 4.0 * self.t * spread**2
-        narrow = self.t / wider
-        for j in np.flatnonzero(narrow >= 1.0):
-            shares = np.exp(-narrow[j] * np.square(np.arange(1.0, 5.0)))
-            aliased[j] = (1.0 + 2.0 * shares @ self.cosines) / np.sqrt(wider[j])
-        return aliased, unaliased
+        narrow = self.t >= wider
+        shares = np.exp(-np.outer((self.t / wider)[narrow], np.square(np.arange(1.0, 5.0))))
+        aliased[narrow] = (1.0 + 2.0 * shares @ self.blur.cosines[:4]) / np.sqrt(wider[narrow])[:, None]
+        return aliased, weights * (self.sampled if spread > 0.0 else aliased), unaliased
 
 
 def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
@@ -140,12 +152,13 @@ def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
 
     `detrended`: of the heights less their straight line.
     """
-    u = np.arange(n + 1)
-    wider = 1.0 + 4.0 * t * spread**2
-    c = np.exp(-(t / wider)[:, None] * np.square(u)) / np.sqrt(wider)[:, None]
-    cosine = fft.dct(c * (n - u), 1, (1,))[:, 1:n]
-    sine = np.zeros_like(cosine) if n < 3 else fft.dst(c[:, 1:n], 1, (1,))
-    power = (cosine - sine / np.sin(np.pi * np.arange(1, n) / n)) / n
+    u, wider = np.arange(n + 1), 1.0 + 4.0 * t * spread**2
+    c = np.exp(np.maximum(np.outer(t / -wider, np.square(u)), FADED))
+    # the sums of (n - u) c cos and of n c sin are the even and the odd part of one transform of 2 n points
+    both = np.concatenate([c * (2.0 * n - u), c[:, n - 1 : 0 : -1] * -u[n - 1 : 0 : -1]], axis=1)
+    both[:, 0], both[:, n] = n, 0.0
+    modes = fft.rfft(both)[:, 1:n]
+    power = (modes.real + modes.imag / (n * np.sin(np.pi * u[1:n] / n))) / n
     if detrended:  # modes of z less its line v (v z): E - 2 g (F C v) + g^2 v C v
         v = np.arange(n) - 0.5 * (n - 1)
         v /= np.sqrt(v @ v)
@@ -153,7 +166,7 @@ def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
         both = np.concatenate([c[:, :n], c[:, n - 1 : 0 : -1]], axis=1)
         cv = fft.irfft(fft.rfft(both) * fft.rfft(np.pad(v, (0, n - 1))), 2 * n - 1)[:, :n]
         power += -2.0 * g * fft.dct(cv, 2, (1,))[:, 1:] / math.sqrt(2.0 * n) + g * g * (cv @ v)[:, None]
-    return np.asarray(np.maximum(power, 1e-14 * c.sum(axis=1, keepdims=True)))
+    return np.asarray(np.maximum(power, 1e-14 * c.sum(axis=1, keepdims=True)) / np.sqrt(wider)[:, None])
 
 
 @dataclass(frozen=True)
@@ -204,8 +217,7 @@ class Bins:
         logs = np.empty((len(self.tables), len(spread) + 1, _LOGITS.size, self.lnq.size))
         for form, table in enumerate(self.tables):
             # only the weights of a surface that was blurred before it was sampled depend on the spread
-            h, s = np.broadcast_arrays(hurst, spread if form == ALIASED else 0.0)
-            weight = weights(h, self.t, form, self.axes, s)
+            weight = weights(hurst, self.t, form, self.axes, spread if form == ALIASED else 0.0)
             logs[form, 1:] = np.log(weight @ table.transpose(0, 2, 1) + least)
         logs[:, 0] = logs[:, 2]
         return logs
@@ -375,25 +387,23 @@ class Lattice:
         return [[along_y, along_x] for along_y, along_x in zip(rows, columns, strict=True)]
 
     @cached_property
-    def _lines(self) -> list[tuple[AxisModes, Array]]:
-        """Modes along y and x, and their densities for a surface that was sampled without a blur."""
+    def _lines(self) -> list[AxisModes]:
+        """Modes along y and x."""
         axes = zip(self.steps, self.spacing, self.wavenumbers, strict=True)
-        lines = [AxisModes(self.t * step * step, q * d) for step, d, q in axes]
-        return [(line, line.densities(0.0)[0]) for line in lines]
+        return [AxisModes(self.t * step * step, q * d) for step, d, q in axes]
 
     def _transform(self, axis: int, spread: float, edges: bool) -> list[Array]:
         n, s = self.shape[axis], spread / self.spacing[axis]
         if n == 1:
             return [np.ones((self.t.size, 1))] * FORMS
-        line, sampled = self._lines[axis]
-        aliased, unaliased = line.densities(s)
-        filtered = np.square(kernel_transfer(s, line.q)) * sampled
+        line = self._lines[axis]
+        aliased, *others = line.densities(s)
         if not edges:
-            return [aliased, filtered, unaliased]
+            return [aliased, *others]
         power = free_power(n, line.t, s, self.axes == 1)
         # the edges feel long waves alone, which are alike in all forms
-        leak = power - aliased
-        return [power, *(np.maximum(leak + clean, 1e-14 * power) for clean in (filtered, unaliased))]
+        leak, least = power - aliased, 1e-14 * power
+        return [power, *(np.maximum(leak + clean, least) for clean in others)]
 
     def power(self, heights: Array) -> Array:
         """Return the squared modes of complete heights."""

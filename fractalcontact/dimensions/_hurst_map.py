@@ -34,10 +34,10 @@ from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
+    Filling,
     bin_numbers,
     clear_modes,
     expected_power,
-    fill,
     gaussian_surfaces,
     log_means,
     make_bins,
@@ -325,16 +325,17 @@ class _Model:
         Gaussian surfaces get the same gaps, as in `filling_ratio`.
         """
         observed = np.isfinite(heights)
+        filling = Filling(observed)
         band = replace(self.lattice, shape=heights.shape)
         pilot = expected_power(band, self.fit.theta, self.fit.form)
         before, after = (np.zeros((columns.size, self.count.size)) for _ in range(2))
         for _, complete in gaussian_surfaces(band, pilot):
             before += self.means(complete, columns)
-            after += self.means(fill(np.where(observed, complete, np.nan)), columns)
+            after += self.means(filling(complete), columns)
         ratio = np.maximum(after / before, 1e-12)
         shares = np.array([observed[:, start : start + self.lattice.shape[1]].mean() for start in columns])
         information = np.square(shares)[:, None] * np.minimum(1.0, ratio)
-        return self.means(fill(heights), columns) / ratio, np.maximum(information, 1e-3)
+        return self.means(filling(heights), columns) / ratio, np.maximum(information, 1e-3)
 
     def components(
         self, level: Array, variance: Array, new_share: float, *, probability: float = 0.99, most: int = 64

@@ -12,14 +12,14 @@ function of q, is interpolated.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 
-from fractalcontact.dimensions._gaussian_mixture import ALIASED, FILTERED, UNALIASED, kernel_transfer
+from fractalcontact.dimensions._gaussian_mixture import ALIASED, FADED, FILTERED, UNALIASED, AxisBlur
 from fractalcontact.dimensions._mode_bins import block_product
 from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, LONG_HURST, NOISE, SHARPNESS, SPREAD
 
@@ -45,7 +45,10 @@ def metric_of(u: float, v: float) -> Array:
 
 def squared_length(metric: Array, y: Array, x: Array) -> Array:
     """Return the squared length of vectors by a metric, or by some of shape (2, 2, ...)."""
-    return np.asarray(metric[0, 0] * y * y + (metric[0, 1] + metric[1, 0]) * y * x + metric[1, 1] * x * x)
+    length = metric[0, 0] * y + (metric[0, 1] + metric[1, 0]) * x
+    length *= y
+    length += metric[1, 1] * x * x
+    return np.asarray(length)
 
 
 @dataclass(frozen=True)
@@ -74,36 +77,46 @@ class MetricSpectrum:
         """By which increments count lengths, shape (2, 2), y first."""
         return metric_of(*self.log_ratio)
 
-    def at(self, y: Array, x: Array) -> Array:
-        """Return the density at wavenumbers, of one shape or as a column and a row."""
-        hurst, spread = float(self.theta[HURST]), float(self.theta[SPREAD])
-        inverse = np.linalg.inv(self.metric)
-        total = np.zeros(np.broadcast(y, x).shape)
-        near_y, near_x = (0, 0) if self.form == UNALIASED else _nearest(self.dy)
-        for down in range(-near_y, near_y + 1):
-            for across in range(-near_x, near_x + 1):
-                qy, qx = y + 2.0 * np.pi / self.dy * down, x + 2.0 * np.pi * across
-                image = np.log(np.maximum(squared_length(inverse, qy, qx), 1e-30))
-                image *= -1.0 - hurst
-                if spread > 0.0 and self.form != FILTERED:
-                    image -= spread**2 * (qy * qy + qx * qx)
-                total += np.exp(image)
+    @cached_property
+    def inverse(self) -> Array:
+        """Of the metric: wavenumbers count by it."""
+        return metric_of(*-self.log_ratio)
+
+    def at(self, y: Array, x: Array, at_once: int = 1 << 13) -> Array:
+        """Return the density at wavenumbers, of one shape or as a column and a row.
+
+        `at_once`: wavenumbers of a grid whose images the cache holds.
+        """
+        hurst, spread, is_grid = float(self.theta[HURST]), float(self.theta[SPREAD]), y.shape != x.shape
+        rows = max(1, at_once // x.size) if is_grid else len(y)
+        starts = range(0, len(y), rows)
+        total = np.concatenate([self._near_images(y[start : start + rows], x) for start in starts])
         if self.form != UNALIASED:
-            rows, columns = (
-                np.polynomial.chebyshev.chebvander(q.ravel() / np.pi, _NODES - 1) for q in (y * self.dy, x)
-            )
-            rows = rows @ self._far_images
-            total += np.sum(rows * columns, axis=1) if y.shape == x.shape else block_product(rows, columns.T)
+            along_y, along_x = (chebvander(q.ravel() / np.pi, _NODES - 1).T for q in (y * self.dy, x))
+            along_y = self._far_images.T @ along_y
+            total += block_product(along_y.T, along_x) if is_grid else (along_y * along_x).sum(axis=0)
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):
-                total *= np.square(kernel_transfer(s, q.ravel()).reshape(q.shape))
+                total *= np.square(AxisBlur(q.ravel()).transfers(s)[1].reshape(q.shape))
         gammas = math.gamma(1.0 + hurst) / math.gamma(1.0 - hurst)
         total *= 2.0 ** (2.0 * hurst + 1.0) * np.pi * hurst * gammas / self.dy
         if self.theta[CORNER] > 0.0:
             sharpness = self.theta[SHARPNESS]
             corner = sharpness * np.log(self.theta[CORNER] ** 2 / np.maximum(y * y + x * x, 1e-30))
             total *= np.exp((self.theta[LONG_HURST] - hurst) / sharpness * np.logaddexp(0.0, corner))
-        return np.maximum(total, 1e-300)
+        return np.asarray(np.maximum(total, 1e-300))
+
+    def _near_images(self, y: Array, x: Array) -> Array:
+        """Return the sum of the nearest images."""
+        near_y, near_x = (0, 0) if self.form == UNALIASED else _nearest(self.dy)
+        down, across = (np.arange(-near, near + 1.0).reshape(-1, *[1] * y.ndim) for near in (near_y, near_x))
+        qy, qx = (y + 2.0 * np.pi / self.dy * down)[:, None], x + 2.0 * np.pi * across
+        density = squared_length(self.inverse, qy, qx)
+        np.log(np.maximum(density, 1e-30, out=density), out=density)
+        density *= -1.0 - float(self.theta[HURST])
+        if self.theta[SPREAD] > 0.0 and self.form != FILTERED:
+            density -= self.theta[SPREAD] ** 2 * (qy * qy + qx * qx)
+        return np.asarray(np.exp(density, out=density).sum(axis=(0, 1)))
 
     def with_noise(self, y: Array, x: Array) -> Array:
         """Return `at` with white noise."""
@@ -114,12 +127,11 @@ class MetricSpectrum:
         """Coefficients of the sum over all images but the nearest, of products of Chebyshev polynomials."""
         hurst = float(self.theta[HURST])
         spread = float(self.theta[SPREAD]) if self.form == ALIASED else 0.0
-        inverse = np.linalg.inv(self.metric)
         (y, x, blur), (sine, cosine, radial), polynomials = _of_any_metric(hurst, spread, self.dy)
-        images = squared_length(inverse, y, x) ** (-1.0 - hurst) * blur
-        by_azimuth = squared_length(inverse, sine, cosine) ** (-1.0 - hurst)
+        images = squared_length(self.inverse, y, x) ** (-1.0 - hurst) * blur
+        by_azimuth = squared_length(self.inverse, sine, cosine) ** (-1.0 - hurst)
         beyond = np.mean(by_azimuth * radial) * (self.dy / (4.0 * np.pi * hurst))
-        return np.asarray(polynomials.T @ (images.sum(axis=2) + beyond) @ polynomials)
+        return np.asarray(polynomials @ (images.sum(axis=2) + beyond) @ polynomials.T)
 
 
 def _nearest(dy: float) -> tuple[int, int]:
@@ -152,29 +164,25 @@ def _of_any_metric(
     edge = 2.0 * np.pi / np.maximum(np.abs(sine) * dy / (last_y + 0.5), np.abs(cosine) / (last_x + 0.5))
     z = np.square(spread * edge)
     blurred = spread ** (2.0 * hurst) * gammaincc(1.0 - hurst, z) * math.gamma(1.0 - hurst)
-    polynomials = np.polynomial.chebyshev.chebvander(places, _NODES - 1) * (2.0 / _NODES)
-    polynomials[:, 0] *= 0.5
+    polynomials = chebvander(places, _NODES - 1).T * (2.0 / _NODES)
+    polynomials[0] *= 0.5
     return (y, x, blur), (sine, cosine, edge ** (-2.0 * hurst) * np.exp(-z) - blurred), polynomials
 
 
 def gaussian_tables(
-    t: Array,
-    spreads: Array,
-    metric: Array,
-    wavenumbers: tuple[Array, Array],
-    dy: float,
-    mean: Callable[[Array], Array],
+    t: Array, spreads: Array, spectrum: MetricSpectrum, y: Array, x: Array, weight: Array, starts: Array
 ) -> Array:
-    """Return means of the densities of Gaussians exp(-t r' M r) after a blur: (forms, spreads, means, t).
+    """Return sums of the densities of Gaussians exp(-t r' M r) after a blur: (forms, spreads, sums, t).
 
-    `mean` maps values at the wavenumbers, along the last axis, to means.
+    Each sum is over the wavenumbers from one of the `starts` to the next, times their `weight`. The first
+    spread is zero.
     """
-    (y, x), inverse = wavenumbers, np.linalg.inv(metric)
+    metric, dy = spectrum.metric, spectrum.dy
     ratio = float(np.linalg.eigvalsh(metric)[-1])
-    down, across = (k.ravel() for k in np.mgrid[-1:2, -1:2])
-    qy, qx = y[:, None] + 2.0 * np.pi / dy * down, x[:, None] + 2.0 * np.pi * across
-    square = qy * qy + qx * qx
-    waves = np.pi / (dy * t) * np.exp(squared_length(inverse, qy, qx)[..., None] * (-0.25 / t))
+    images = np.array([0.0, -2.0, 2.0]) * np.pi
+    qy, qx = (y[:, None] + images / dy)[:, :, None], (x[:, None] + images)[:, None]
+    squares = squared_length(spectrum.inverse, qy, qx).reshape(y.size, 9, 1)
+    waves = np.exp(np.maximum(squares * (-0.25 / t), FADED)) * (weight[:, None, None] * np.pi / (dy * t))
     # of narrow Gaussians the sum over lags is the shorter one, of some lags at a time
     wide = max(1.0, dy)
     down, across = math.ceil(_REACH * ratio * wide / dy), math.ceil(_REACH * ratio * wide)
@@ -188,17 +196,23 @@ def gaussian_tables(
     for start in range(0, ry.size, _LAGS):
         some = slice(start, start + _LAGS)
         cosines = 2.0 * np.cos(np.outer(y, ry[some]) + np.outer(x, rx[some]))
-        sums += block_product(cosines, np.exp(-squared_length(forms, ry[some], rx[some])).T)
-    sums = sums.reshape(y.size, *blurred.shape[:2]) / np.sqrt(np.linalg.det(blurred))
-    tables: list[list[Array]] = []
-    for k, spread in enumerate(spreads):
-        blur = np.exp(-(spread**2) * square)
-        aliased = np.matmul(blur[:, None], waves)[:, 0]
-        if k < near.size:  # wider blurs end within the nine images
-            aliased[:, narrow] = sums[:, k]
-        if not tables:
-            sampled = aliased
-        transfer = np.square(kernel_transfer(spread / dy, y * dy) * kernel_transfer(spread, x))
-        unaliased = blur[:, 4, None] * waves[:, 4]
-        tables.append([mean(each.T).T for each in (aliased, transfer[:, None] * sampled, unaliased)])
-    return np.maximum(np.moveaxis(np.array(tables), 1, 0), 0.0)  # sums of lags end in rounding
+        shares = np.exp(np.maximum(-squared_length(forms, ry[some], rx[some]), FADED))
+        sums += block_product(cosines, shares.T)
+    scale = weight[:, None, None] / np.sqrt(np.linalg.det(blurred))
+    sums = sums.reshape(scale.shape) * scale
+    sampled = waves.sum(axis=1)
+    sampled[:, narrow] = sums[:, 0]
+    lines = (AxisBlur(y * dy), dy), (AxisBlur(x), 1.0)
+    along = [[line.transfers(s / d) for s in spreads] for line, d in lines]
+    (blur_y, weights_y), (blur_x, weights_x) = (map(np.array, zip(*each, strict=True)) for each in along)
+    blur_y, blur_x, filtered = np.square(blur_y), np.square(blur_x), np.square(weights_y * weights_x)
+    tables = np.empty((3, spreads.size, starts.size, t.size))
+    for m, some in enumerate(map(slice, starts, [*starts[1:], y.size])):
+        blur = blur_y[:, :, None, some] * blur_x[:, None, :, some]
+        by_wave = np.moveaxis(waves[some], 1, 0)
+        tables[ALIASED, :, m] = block_product(blur.reshape(spreads.size, -1), by_wave.reshape(-1, t.size))
+        # wider blurs end within the nine images
+        tables[ALIASED, : near.size, m, narrow] = sums[some].sum(axis=0).T
+        tables[FILTERED, :, m] = block_product(filtered[:, some], sampled[some])
+        tables[UNALIASED, :, m] = block_product(blur[:, 0, 0], by_wave[0])
+    return np.maximum(tables, 0.0)  # sums of lags end in rounding

@@ -93,15 +93,17 @@ def whitened(lattice: Lattice, power: Array, pilot: Array, keep: Array) -> Array
     """Return power over pilot, with the median of each half octave as expected of Gaussian heights."""
     classes = _classes(lattice, keep, 0.5 * _OCTAVE, math.inf)
     ratio = power / pilot
-    places = _sums(classes, ratio, lattice, _MEDIAN_SAMPLE)[2]
-    factor = np.ones(classes.count.size + 1)  # the last one of modes that do not count
-    for octave, chosen in enumerate(places):
-        values = ratio.ravel()[chosen[chosen >= 0]]
-        factor[octave] = lattice.median / max(float(np.median(values)), 1e-300)
-    factor = factor[classes.joined]
+    # the last one of modes that do not count
+    factor = np.append(1.0 / np.maximum(_medians(classes, ratio, lattice), 1e-300), 1.0)[classes.joined]
     for rows in _blocks(len(ratio)):  # no second array of the size of the surface
         ratio[rows] *= factor[classes.number[rows]]
     return ratio
+
+
+def _medians(classes: _Classes, values: Array, lattice: Lattice) -> Array:
+    """Return the median of each class, over that of the squared modes of unit power."""
+    places = _sums(classes, values, lattice, _MEDIAN_SAMPLE)[2]
+    return np.array([np.median(values.ravel()[chosen[chosen >= 0]]) for chosen in places]) / lattice.median
 
 
 def single_waves(lattice: Lattice, ratio: Array, keep: Array) -> Array:
@@ -251,9 +253,7 @@ def make_bins(
     total, lnq, chosen = _sums(classes, ratio, lattice, _SAMPLES[not is_pilot])
     mean = total / count
     if is_tapered:
-        places = _sums(classes, ratio, lattice, _MEDIAN_SAMPLE)[2]
-        values = np.where(places >= 0, ratio.ravel()[places], np.nan)
-        mean = np.nanmedian(values, axis=1) / lattice.median
+        mean = _medians(classes, ratio, lattice)
     share = information
     if np.ndim(information) > 0:
         share = _sums(classes, np.asarray(information), lattice, 1)[0] / count
@@ -307,53 +307,68 @@ def rms_increment(heights: Array) -> float:
     return 1.0
 
 
-def fill(heights: Array, sweeps: int = 12) -> Array:
-    """Return heights whose missing points have the mean of their surroundings, of the pyramid of 2 x 2 means.
+def fill(heights: Array) -> Array:
+    """Return heights without gaps, see `Filling`; complete ones as they are."""
+    observed = np.isfinite(heights)
+    return heights if observed.all() else Filling(observed)(heights)
+
+
+class Filling:
+    """Fill gaps with the mean of their surroundings, of the pyramid of 2 x 2 means.
 
     Some sweeps then move each missing point to the mean of its four neighbours; after twelve the fill of
-    single points is harmonic to 1 %.
+    single points is harmonic to 1 %. Those of a profile are filled by straight lines.
+
+    Parameters
+    ----------
+    observed : ndarray of bool
     """
-    observed = np.isfinite(heights)
-    if observed.all():
-        return heights
-    if heights.shape[0] == 1:
-        places = np.arange(heights.size)
-        return np.asarray(np.interp(places, places[observed[0]], heights[observed])[None])
-    filled = _means(np.where(observed, heights, 0.0), observed.astype(float))
-    flat, (ny, nx) = filled.ravel(), heights.shape
-    rows, columns = np.nonzero(~observed)
-    above, below = np.maximum(rows - 1, 0) * nx + columns, np.minimum(rows + 1, ny - 1) * nx + columns
-    left, right = rows * nx + np.maximum(columns - 1, 0), rows * nx + np.minimum(columns + 1, nx - 1)
-    missing = rows * nx + columns
-    for _ in range(sweeps):
-        flat[missing] = 0.25 * (flat[above] + flat[below] + flat[left] + flat[right])
-    return filled
 
+    def __init__(self, observed: Array) -> None:
+        self.observed, weights = observed, [observed.astype(float)]
+        while weights[-1].size > 1 and not weights[-1].all():
+            weights.append(_halved(weights[-1]))
+        self.levels = [(np.maximum(weight, 1.0), *np.nonzero(weight == 0.0)) for weight in weights]
+        (_, y, x), steps = self.levels[0], ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+        places = [np.ravel_multi_index((y + i, x + j), observed.shape, mode="clip") for i, j in steps]
+        self.missing, *self.near = places
 
-def _means(values: Array, weights: Array) -> Array:
-    """Return values over weights where there are any, the same of sums of 2 x 2 points elsewhere."""
-    mean = np.divide(values, weights, out=np.zeros_like(values), where=weights > 0.0)
-    rows, columns = np.nonzero(weights == 0.0)
-    if rows.size and max(values.shape) > 1:
-        mean[rows, columns] = _means(_halved(values), _halved(weights))[rows // 2, columns // 2]
-    return mean
+    def __call__(self, heights: Array, sweeps: int = 12) -> Array:
+        """Return heights without gaps."""
+        if len(heights) == 1:
+            places, seen = np.arange(heights.size), self.observed[0]
+            return np.asarray(np.interp(places, places[seen], heights[0, seen])[None])
+        filled = self._means(np.where(self.observed, heights, 0.0))
+        flat = filled.ravel()
+        for _ in range(sweeps):
+            flat[self.missing] = 0.25 * sum(flat[near] for near in self.near)
+        return filled
+
+    def _means(self, sums: Array, level: int = 0) -> Array:
+        """Return sums over weights where there are any, the same of sums of 2 x 2 points elsewhere."""
+        weight, rows, columns = self.levels[level]
+        mean = np.asarray(sums / weight)
+        if level + 1 < len(self.levels):
+            mean[rows, columns] = self._means(_halved(sums), level + 1)[rows // 2, columns // 2]
+        return mean
 
 
 def _halved(values: Array) -> Array:
     """Return the sums of 2 x 2 points."""
-    for _ in range(2):
-        sums = values[::2].copy()
-        sums[: len(values) // 2] += values[1::2]
-        values = sums.T
-    return values
+    ny, nx = (n // 2 for n in values.shape)
+    rows = values[::2].copy()
+    rows[:ny] += values[1::2]
+    sums = rows[:, ::2].copy()
+    sums[:, :nx] += rows[:, 1::2]
+    return sums
 
 
 def filling_ratio(lattice: Lattice, pilot: Array, observed: Array) -> Array:
     """Return the power of modes after filling over that before, for Gaussian modes of the pilot."""
-    before, after = np.zeros_like(pilot), np.zeros_like(pilot)
+    before, after, filling = np.zeros_like(pilot), np.zeros_like(pilot), Filling(observed)
     for modes, heights in gaussian_surfaces(lattice, pilot):
         before += modes**2
-        after += lattice.power(fill(np.where(observed, heights, np.nan)))
+        after += lattice.power(filling(heights))
     classes = _classes(lattice, np.ones(pilot.shape, dtype=bool), _OCTAVE / PER_OCTAVE, -math.inf)
     filled, complete = (_sums(classes, power / pilot, lattice, 1)[0] for power in (after, before))
     ratio = np.divide(filled, complete, out=np.ones_like(filled), where=complete > 0.0)

@@ -270,7 +270,7 @@ def log_ratio(
     sine, cosine = np.sin(levels.azimuth), np.cos(levels.azimuth)
 
     def logs(uv: Array) -> Array:
-        values = 0.5 * slope * np.log(squared_length(np.linalg.inv(metric_of(*uv)), sine, cosine))
+        values = 0.5 * slope * np.log(squared_length(metric_of(*-uv), sine, cosine))
         return np.asarray(values - weight @ values / weight.sum())
 
     target = levels.level + logs(before)

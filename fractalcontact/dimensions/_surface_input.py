@@ -231,13 +231,6 @@ def is_lazy(array: xr.DataArray) -> bool:
     return has_blocks(array)
 
 
-def has_gaps(surface: Any) -> bool:
-    """Return whether heights that are in memory have missing points."""
-    if not isinstance(surface, xr.DataArray) or is_lazy(surface) or surface.dtype.kind != "f":
-        return False
-    return bool(surface.size) and bool(np.isnan(_distinct(surface.values).min()))
-
-
 def check_surface(
     problems: Problems,
     *,

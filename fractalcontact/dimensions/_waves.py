@@ -327,8 +327,9 @@ class Search:
         """
         from scipy.ndimage import maximum_filter1d
 
-        levels = np.array([np.median(ring) for ring in np.split(power.ravel()[self.order], self.ends)])
-        logs = np.log(np.maximum(levels / math.log(2.0), rounding * float(power.max())))
+        rings = [np.sort(ring) for ring in np.split(power.ravel()[self.order], self.ends)]
+        medians = 0.5 * np.array([ring[(ring.size - 1) // 2] + ring[ring.size // 2] for ring in rings])
+        logs = np.log(np.maximum(medians / math.log(2.0), rounding * float(power.max())))
         # the level falls by half from ring to ring, at most: a band may end inside a ring
         logs = np.maximum(logs, maximum_filter1d(logs, 3) - math.log(2.0))
         ratio = power / np.exp(np.interp(self.log_q, self.log_ring, logs))

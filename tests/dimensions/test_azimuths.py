@@ -46,7 +46,7 @@ def by_pairs(hurst, metric, noise):
         down, across = y + a[0] - b[0], x + a[1] - b[1]
         heights = -0.5 * squared_length(metric, down * DY, across * 1.0) ** hurst
         covariance += one * two * (heights + noise**2 * ((down == 0) & (across == 0)))
-    taper = np.outer(*modes.tapers)
+    taper = modes.taper
     pairs = np.zeros((ny, nx))
     rows, columns = np.arange(ny), np.arange(nx)
     for i, j in itertools.product(rows, columns):
@@ -87,11 +87,9 @@ def test_densities_under_a_metric_are_sums_over_all_images(ratio, dy):
     plain = (images ** (-1.0 - hurst)).sum(axis=(1, 2))
     theta = np.array([hurst, 0.0, 0.0, 0.0, 0.0, 1.0])
     t = mixture(64.0 * max(dy, 1.0))
-    tables = gaussian_tables(t, np.zeros(1), metric_of(*log_ratio), (y, x), dy, lambda values: values)
-    for found in (
-        MetricSpectrum(theta, ALIASED, log_ratio, dy).at(y, x),
-        tables[0, 0] @ weights(hurst, t, 0, 2),
-    ):
+    spectrum = MetricSpectrum(theta, ALIASED, log_ratio, dy)
+    tables = gaussian_tables(t, np.zeros(1), spectrum, y, x, np.ones(y.size), np.arange(y.size))
+    for found in (spectrum.at(y, x), tables[0, 0] @ weights(hurst, t, 0, 2)):
         deviation = np.log(found / plain)
         assert np.abs(deviation - np.median(deviation)).max() < 2e-3
 
