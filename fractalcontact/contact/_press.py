@@ -48,7 +48,7 @@ def _check(problems: Problems) -> None:
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     """Return the bytes of the solver on the planes that are pressed at once."""
     # bytes of a node as measured: the solver with the steps before, indentation, one more solution
-    node = 80.0 if is_periodic(arguments.get("boundary"), plane.periodic) else 196.0
+    node = 88.0 if is_periodic(arguments.get("boundary"), plane.periodic) else 196.0
     node += 64.0 if arguments.get("hardness") else 0.0
     node += 72.0 if "stiffness" in word_tuple(arguments.get("include")) else 0.0
     return node * plane.cells / plane.planes * min(plane.planes, thread_count())

@@ -41,11 +41,15 @@ CLOSURE_MARGIN = 1.1
 
 
 class PastStep(NamedTuple):
-    """A step that has been solved: what was imposed, and the scaled solution."""
+    """A step that has been solved: what was imposed, and the scaled solution.
+
+    `state` is the pressure less the gap over the compliance of a node by itself: positive in contact, beyond
+    the largest pressure where a node yields, and the more negative the wider a node is open.
+    """
 
     control: float
     closure: float
-    pressure: Array
+    state: Array
 
 
 class WindowSolver:
@@ -74,7 +78,7 @@ class WindowSolver:
         if solution.reason in ("rounding", "stagnated"):
             solution = self.solve_from_the_closure(control, solution)
         solution = self.remove_rounding_pressure(solution)
-        past = PastStep(control.value, solution.closure, solution.pressure)
+        past = PastStep(control.value, solution.closure, self.state_of(solution))
         self.past_steps = [*self.past_steps[-1:], past]
         return replace(solution, iterations=self.iterations, transforms=self.transforms)
 
@@ -114,6 +118,14 @@ class WindowSolver:
         is_open = self.problem.gap + solution.displacement > solution.closure
         return replace(solution, pressure=np.where(tiny & is_open, 0.0, pressure))
 
+    def state_of(self, solution: Solution) -> Array:
+        """Return the state of `PastStep`: a node by itself moves by its pressure times d, within 4 %."""
+        state = self.problem.gap + solution.displacement
+        state -= solution.closure
+        state /= -np.sqrt(self.problem.body.spacing[0] * self.problem.body.spacing[1])
+        state += solution.pressure
+        return state
+
     def add_work(self, solution: Solution) -> None:
         """Add the iterations and transforms of one of the attempts of a step to its totals."""
         self.iterations += solution.iterations
@@ -125,9 +137,14 @@ class WindowSolver:
         self,
         control: Control,
         *,
-        max_steps: float = 2.0,  # of the path; .5 took 4 % more transforms, 8 the same
+        max_steps: float = 2.0,  # of the path; .5: 1.22 times the transforms, 8: .99
     ) -> Array | None:
-        """Return the pressure extrapolated from the last two steps, linear in the log of the control."""
+        """Return the pressure of the state extrapolated from two steps, linear in the log of the control.
+
+        A node that is about to close enters with a pressure. Extrapolating the pressure alone took 1.12 times
+        as many transforms on paths on rough surfaces, up to 1.31; ten times the compliance, or a quarter of
+        it, takes 1.06. Linear in the control takes 1.12, a parabola through three steps 1.03.
+        """
         if self._guess is not None:
             return self._guess
         if not self.past_steps:
@@ -136,8 +153,8 @@ class WindowSolver:
         if first.control != last.control:
             steps = np.log(control.value / last.control) / np.log(last.control / first.control)
             if abs(steps) <= max_steps:
-                return np.asarray(np.maximum(last.pressure + steps * (last.pressure - first.pressure), 0.0))
-        return np.asarray(last.pressure * (control.value / last.control))
+                return np.asarray(np.maximum(last.state + steps * (last.state - first.state), 0.0))
+        return np.asarray(np.maximum(last.state, 0.0) * (control.value / last.control))
 
     def extrapolated_closure(
         self,
