@@ -193,8 +193,7 @@ class Classes:
         ring = joined_classes(np.bincount(ring))[ring].astype(int)
         self.places, self.expected = np.flatnonzero(keep), expected[keep]
         self.rings = int(ring.max(initial=0)) + 1
-        rows, columns = np.nonzero(keep)
-        y, x = modes.y[rows, 0], modes.x[columns]
+        y, x = (np.broadcast_to(q, keep.shape)[keep] for q in (modes.y, modes.x))
         sector = np.rint(np.arctan2(y, x) * (SECTORS / np.pi)).astype(int) % SECTORS
         present, self.number = _numbered(ring * SECTORS + sector)
         self.ring, self.sector = np.divmod(present, SECTORS)

@@ -21,6 +21,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebvander
 
 from fractalcontact.base import fft
 
@@ -101,7 +102,7 @@ class AxisBlur:
 
     def __init__(self, q: Array) -> None:
         self.waves = q + np.array([0.0, -2.0 * np.pi, 2.0 * np.pi])[:, None]
-        self.cosines = np.cos(np.outer(np.arange(1.0, 9.0), q))
+        self.cosines = chebvander(np.cos(q), 8).T[1:]  # of 1 ... 8 points
 
     def transfers(self, spread: float) -> tuple[Array, Array]:
         """Return the transfer functions of a Gaussian blur and of Gaussian weights of points, `spread` in
