@@ -363,34 +363,42 @@ def _null(
     mean = cover_curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
     contents = _random_null.box_contents(planes, sizes, cover)
     small_contents = _random_null.box_contents(planes, small, "mean")
-    pairs_of = _random_null.aligned if cover == "aligned" else _random_null.any_place
+    is_aligned = cover == "aligned"
+    longest = max(1, *sizes.tolist(), *small.tolist())
+    largest = (2.0 * longest) ** planes.rank  # two corners, or more than two boxes
     counts, rows = [], []
     for plane, (cells, observed) in enumerate(zip(planes.occupied, planes.observed, strict=True)):
         place = min(plane, len(contents) - 1)
         boxes = [contents[place][size] for size in sizes.tolist()]
-        largest = (
-            2.0 * float(max(sizes.max(), *tested))
-        ) ** planes.rank  # two corners, or more than two boxes
         random_cells = _random_null.RandomCells(cells, observed, largest)
         null = random_cells.expected_counts(boxes)
         used, part = sizes[windows[plane]], null[windows[plane]]
         dimension = _null_dimension(used, part, by_regression=by_regression)
         deviation, differs = np.nan, False
+        if planes.valid is not None and plane < len(planes.valid):
+            gaps = [
+                _random_null.PairsInGaps(planes.valid[plane], planes.rank, longest, is_aligned=each)
+                for each in (is_aligned, False)
+            ]
         if np.isfinite(dimension):
             knots = _knots(used)
-            covariance = _random_null.count_covariance(
-                random_cells,
-                planes.sides,
-                used[knots],
-                [boxes[windows[plane]][knot] for knot in knots],
-                pairs_of,
-            )
+            at_knots = used[knots], [boxes[windows[plane]][knot] for knot in knots]
+            if planes.valid is not None:
+                covariance = _random_null.covariance_in_gaps(random_cells, *at_knots, gaps[0])
+            else:
+                along = _random_null.aligned if is_aligned else _random_null.any_place
+                covariance = _random_null.count_covariance(random_cells, planes.sides, *at_knots, along)
             fit = partial(_null_dimension, used, by_regression=by_regression)
             deviation = _random_null.dimension_deviation(fit, used, part, knots, covariance)
             if small.size:
-                small_boxes = [small_contents[place][size] for size in small.tolist()]
-                covariance = _random_null.count_covariance(random_cells, planes.sides, small, small_boxes)
-                expected = random_cells.expected_counts(small_boxes)
+                tested_boxes = [small_contents[place][size] for size in small.tolist()]
+                if planes.valid is not None:
+                    covariance = _random_null.covariance_in_gaps(random_cells, small, tested_boxes, gaps[1])
+                else:
+                    covariance = _random_null.count_covariance(
+                        random_cells, planes.sides, small, tested_boxes
+                    )
+                expected = random_cells.expected_counts(tested_boxes)
                 differs = _random_null.differs_from_null(mean[plane], expected, covariance)
         counts.append(null)
         rows.append((dimension, deviation, differs))

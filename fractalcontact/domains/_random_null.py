@@ -20,7 +20,7 @@ import numpy as np
 from fractalcontact.domains._masks import Array, Planes
 
 LEAST_LOG = -700.0  # of a probability: float64 ends at exp(-745), and the product of two is 0
-# Pairs of boxes along an axis: the cells of one, of the other, the cells they share, and the number of pairs.
+# pairs of boxes: the observed cells of one, of the other, those they share, and the number of such pairs
 Pairs = tuple[Array, Array, Array, Array]
 
 
@@ -115,6 +115,110 @@ def aligned(n: int, first: int, second: int) -> Pairs:
     return (*pairs, number.astype(float))
 
 
+class PairsInGaps:
+    """Overlapping boxes of two sizes on a plane (ny, nx) with gaps: those of aligned grids, or some for all.
+
+    Of boxes at all places, on the plane closed to a torus, `of_each` stand for all that hold as many observed
+    cells, in `most_numbers` classes at most. Beside each the other box stands at `most_offsets` along an
+    axis. On 8 planes with .3 or .4 of their cells missing, in patches or one by one, at coverages of .02 to
+    .7, the deviation of the dimension was .99 to 1.20 times that of 300 realisations, .90 to 1.34 with free
+    edges (once 1.6), and .94 to 1.35 on aligned grids.
+    """
+
+    def __init__(
+        self,
+        valid: Array,
+        rank: int,
+        longest: int,
+        *,
+        is_aligned: bool,
+        most_offsets: int = 9,
+        most_numbers: int = 40,
+        of_each: int = 8,
+        most_places: int = 1 << 16,  # of larger planes so many are drawn, always the same
+    ) -> None:
+        self.shape, self.rank, self.is_aligned = valid.shape, rank, is_aligned
+        self.most_offsets, self.most_numbers, self.of_each = most_offsets, most_numbers, of_each
+        self.most_places = most_places
+        continued = np.pad(valid, [(0, edge) for edge in self._box(longest)], mode="wrap")
+        self._sums = np.pad(continued.astype(np.int32).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
+        self._pairs: dict[tuple[int, int], Pairs] = {}
+        self._places: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
+
+    def __call__(self, first: int, second: int) -> Pairs:
+        """Return the pairs of a box and a box that is no larger."""
+        if (first, second) not in self._pairs:
+            find = self._aligned if self.is_aligned else self._any_place
+            a, b, shared, number = np.broadcast_arrays(*find(self._box(first), self._box(second)))
+            overlap = shared > 0
+            self._pairs[first, second] = a[overlap], b[overlap], shared[overlap], number[overlap]
+        return self._pairs[first, second]
+
+    def _box(self, size: int) -> tuple[int, int]:
+        ny, nx = self.shape
+        return min(size, ny) if self.rank == 2 else 1, min(size, nx)
+
+    def _observed(self, low: Sequence[Array], high: Sequence[Array]) -> Array:
+        """Return the observed cells of regions from `low` up to `high`, (y, x), which may begin anywhere."""
+        (y, x), (ny, nx) = low, self.shape
+        top, left = y % ny, x % nx
+        bottom, right = top + np.maximum(high[0] - y, 0), left + np.maximum(high[1] - x, 0)
+        sums = self._sums
+        return np.asarray(sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left])
+
+    def _aligned(self, box: tuple[int, int], other: tuple[int, int]) -> Pairs:
+        starts = []
+        for n, edges in zip(self.shape, zip(box, other, strict=True), strict=True):
+            starts.append(np.union1d(*(np.arange(0, n, edge) for edge in edges)))
+        ends = [np.append(start[1:], n) for start, n in zip(starts, self.shape, strict=True)]
+        low, high = np.meshgrid(*starts, indexing="ij"), np.meshgrid(*ends, indexing="ij")
+        a, b = (self._observed(*self._box_around(low, edges)) for edges in (box, other))
+        return a, b, self._observed(low, high), np.ones(low[0].shape)
+
+    def _box_around(self, low: Sequence[Array], edges: tuple[int, int]) -> tuple[list[Array], list[Array]]:
+        begin = [start // edge * edge for start, edge in zip(low, edges, strict=True)]
+        end = [np.minimum(at + e, n) for at, e, n in zip(begin, edges, self.shape, strict=True)]
+        return begin, end
+
+    def _any_place(self, box: tuple[int, int], other: tuple[int, int]) -> Pairs:
+        y, x, stands_for = (values[:, None, None] for values in self._chosen(box))
+        (dy, many_y), (dx, many_x) = map(self._offsets, box, other)
+        top, left = y + dy[:, None], x + dx
+        a = self._observed((y, x), (y + box[0], x + box[1]))
+        b = self._observed((top, left), (top + other[0], left + other[1]))
+        low = np.maximum(y, top), np.maximum(x, left)
+        high = np.minimum(y + box[0], top + other[0]), np.minimum(x + box[1], left + other[1])
+        grids = float(np.prod(box) * np.prod(other))  # offsets of both grids
+        return a, b, self._observed(low, high), stands_for * (many_y * many_x / grids)
+
+    def _chosen(self, box: tuple[int, int]) -> tuple[Array, Array, Array]:
+        """Return y and x of some boxes, and how many each stands for."""
+        if box in self._places:
+            return self._places[box]
+        total = self.shape[0] * self.shape[1]
+        places = np.arange(total)
+        if total > self.most_places:
+            places = np.random.default_rng(0).integers(total, size=self.most_places)
+        y, x = np.divmod(places, self.shape[1])
+        numbers, kind = np.unique(self._observed((y, x), (y + box[0], x + box[1])), return_inverse=True)
+        group = (np.arange(numbers.size) * min(self.most_numbers, numbers.size) // numbers.size)[kind]
+        order, members = np.argsort(group, kind="stable"), np.bincount(group)
+        first, some = np.cumsum(members) - members, np.minimum(members, self.of_each)
+        parts = [order[at + np.arange(k) * n // k] for at, n, k in zip(first, members, some, strict=True)]
+        chosen = np.concatenate(parts)
+        stands_for = np.repeat(members / some, some) * (total / places.size)
+        self._places[box] = y[chosen], x[chosen], stands_for
+        return self._places[box]
+
+    def _offsets(self, edge: int, other: int) -> tuple[Array, float]:
+        """Return the offsets of the other box at which it overlaps, and how many each stands for."""
+        every = np.arange(1 - other, edge)
+        if every.size <= self.most_offsets:
+            return every, 1.0
+        places = (np.arange(self.most_offsets) + 0.5) * every.size / self.most_offsets
+        return every[places.astype(np.int64)], every.size / self.most_offsets
+
+
 def count_covariance(
     null: RandomCells,
     shape: Sequence[int],
@@ -126,28 +230,22 @@ def count_covariance(
 ) -> Array:
     """Covariance of the counts at all pairs of sizes; of counts averaged over the offsets with `any_place`.
 
-    Exact on a periodic plane and on aligned grids of planes without gaps. Where boxes of one size hold
-    different numbers of observed cells, at free edges or in gaps, the covariances of full boxes are scaled by
-    what that changes in the variances on one grid. Free edges then change the deviation of a dimension by
-    less than 10 %; where .4 of the cells are not observed, in patches, it is .6 to 1.7 times the true one.
+    Exact on a periodic plane and on aligned grids. At free edges, where boxes at any place hold different
+    numbers of cells, the covariances of full boxes are scaled by what that changes in the variances on one
+    grid; the deviation of a dimension is then off by less than 10 %.
     """
-    share = null.observed / float(np.prod(shape))
     areas = np.array([np.prod(np.minimum(size, shape)) for size in sizes])
     scatters = null.log_miss(areas) > never_empty
     covariance = np.zeros((sizes.size, sizes.size))
     for i, first in enumerate(sizes.tolist()):
         for j, second in enumerate(sizes[: i + 1].tolist()):
-            if not (pairs_of is aligned or (scatters[i] and scatters[j])):
-                continue
-            axes = [pairs_of(n, first, second) for n in shape]
-            a, b, shared, number = (reduce(np.multiply.outer, parts) for parts in zip(*axes, strict=True))
-            value = float(np.sum(number * null.both_empty(a, b, shared)))
-            if share < 1.0:
-                # as many pairs overlap for each observed cell, and fewer are apart
-                apart = float(null.both_empty(areas[i], areas[j], np.zeros((), int)))
-                value = share * (value + (share - 1.0) * number.sum() * apart)
-            covariance[i, j] = covariance[j, i] = value
-    if pairs_of is aligned and share == 1.0:
+            if pairs_of is aligned or (scatters[i] and scatters[j]):
+                axes = [pairs_of(n, first, second) for n in shape]
+                a, b, shared, number = (
+                    reduce(np.multiply.outer, values) for values in zip(*axes, strict=True)
+                )
+                covariance[i, j] = covariance[j, i] = np.sum(number * null.both_empty(a, b, shared))
+    if pairs_of is aligned:
         return covariance
     ratio = np.ones(sizes.size)
     for i, (of, area) in enumerate(zip(contents, areas, strict=True)):
@@ -155,6 +253,24 @@ def count_covariance(
         if full > 0.0:
             ratio[i] = np.sqrt(null.share_variance(of) / full)
     return np.asarray(covariance * ratio[:, None] * ratio)
+
+
+def covariance_in_gaps(
+    null: RandomCells, sizes: Array, contents: Sequence[BoxContents], pairs_of: PairsInGaps
+) -> Array:
+    """Covariance of the counts at all pairs of ascending sizes, on a plane with gaps."""
+    # of boxes that are apart, q(a + b) - q(a) q(b) is -a q(a) b q(b) times this
+    coupling = null.cells / (null.observed * max(null.observed - null.cells, 1.0))
+    sums = [of.boxes * float(of.share @ (of.cells * null.miss(of.cells))) for of in contents]
+    covariance = np.zeros((sizes.size, sizes.size))
+    for i, first in enumerate(sizes.tolist()):
+        for j, second in enumerate(sizes[: i + 1].tolist()):
+            a, b, shared, number = pairs_of(first, second)
+            apart = sums[i] * sums[j] - float(number @ (a * null.miss(a) * b * null.miss(b)))
+            value = float(number @ null.both_empty(a, b, shared)) - coupling * apart
+            covariance[i, j] = covariance[j, i] = value
+    counted = np.array([of.measure / of.boxes for of in contents])
+    return np.asarray(covariance * counted[:, None] * counted)
 
 
 def dimension_deviation(
