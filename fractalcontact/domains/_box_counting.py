@@ -361,45 +361,26 @@ def _null(
     shorter = min(planes.sides)
     small = np.array([size for size in tested if 2 * size <= shorter], np.int64)
     mean = cover_curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
-    contents = _random_null.box_contents(planes, sizes, cover)
-    small_contents = _random_null.box_contents(planes, small, "mean")
-    is_aligned = cover == "aligned"
-    longest = max(1, *sizes.tolist(), *small.tolist())
-    largest = (2.0 * longest) ** planes.rank  # two corners, or more than two boxes
+    largest = (2.0 * max(1, *sizes, *small)) ** planes.rank  # cells of two corners, or more than two boxes
     counts, rows = [], []
     for plane, (cells, observed) in enumerate(zip(planes.occupied, planes.observed, strict=True)):
-        place = min(plane, len(contents) - 1)
-        boxes = [contents[place][size] for size in sizes.tolist()]
+        if plane == 0 or (planes.valid is not None and plane < len(planes.valid)):
+            boxes = _random_null.NullBoxes(planes, plane, sizes, cover)
+            small_boxes = _random_null.NullBoxes(planes, plane, small, "mean")
         random_cells = _random_null.RandomCells(cells, observed, largest)
-        null = random_cells.expected_counts(boxes)
+        null = boxes.expected_counts(random_cells, sizes)
         used, part = sizes[windows[plane]], null[windows[plane]]
-        dimension = _null_dimension(used, part, by_regression=by_regression)
-        deviation, differs = np.nan, False
-        if planes.valid is not None and plane < len(planes.valid):
-            gaps = [
-                _random_null.PairsInGaps(planes.valid[plane], planes.rank, longest, is_aligned=each)
-                for each in (is_aligned, False)
-            ]
+        fit = partial(_null_dimension, used, by_regression=by_regression)
+        dimension, deviation, differs = fit(part), np.nan, False
         if np.isfinite(dimension):
             knots = _knots(used)
-            at_knots = used[knots], [boxes[windows[plane]][knot] for knot in knots]
-            if planes.valid is not None:
-                covariance = _random_null.covariance_in_gaps(random_cells, *at_knots, gaps[0])
-            else:
-                along = _random_null.aligned if is_aligned else _random_null.any_place
-                covariance = _random_null.count_covariance(random_cells, planes.sides, *at_knots, along)
-            fit = partial(_null_dimension, used, by_regression=by_regression)
+            covariance = boxes.covariance(random_cells, used[knots])
             deviation = _random_null.dimension_deviation(fit, used, part, knots, covariance)
-            if small.size:
-                tested_boxes = [small_contents[place][size] for size in small.tolist()]
-                if planes.valid is not None:
-                    covariance = _random_null.covariance_in_gaps(random_cells, small, tested_boxes, gaps[1])
-                else:
-                    covariance = _random_null.count_covariance(
-                        random_cells, planes.sides, small, tested_boxes
-                    )
-                expected = random_cells.expected_counts(tested_boxes)
-                differs = _random_null.differs_from_null(mean[plane], expected, covariance)
+            differs = _random_null.differs_from_null(
+                mean[plane],
+                small_boxes.expected_counts(random_cells, small),
+                small_boxes.covariance(random_cells, small),
+            )
         counts.append(null)
         rows.append((dimension, deviation, differs))
     dimension, deviation, differs = np.array(rows, float).T

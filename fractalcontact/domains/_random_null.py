@@ -234,7 +234,7 @@ def count_covariance(
     numbers of cells, the covariances of full boxes are scaled by what that changes in the variances on one
     grid; the deviation of a dimension is then off by less than 10 %.
     """
-    areas = np.array([np.prod(np.minimum(size, shape)) for size in sizes])
+    areas = np.array([np.prod(np.minimum(size, shape)) for size in sizes], np.int64)
     scatters = null.log_miss(areas) > never_empty
     covariance = np.zeros((sizes.size, sizes.size))
     for i, first in enumerate(sizes.tolist()):
@@ -308,38 +308,56 @@ def differs_from_null(
     return bool(np.any(np.abs(mean_counts - null) > deviations * deviation + 1.0))
 
 
-def box_contents(planes: Planes, sizes: Array, cover: str) -> list[dict[int, BoxContents]]:
-    """Return the contents of boxes by size, for all planes together or, with `valid`, for each plane of it.
+class NullBoxes:
+    """The boxes of a cover on one plane, whatever the cells of the null: contents by size, and pairs."""
 
-    Boxes longer than half the shorter side are taken to be full or, with `valid`, to hold as many times more
-    cells than the longest of the others as they are larger.
+    def __init__(self, planes: Planes, plane: int, sizes: Array, cover: str) -> None:
+        self.sides, self.is_aligned = planes.sides, cover == "aligned"
+        longest = max(1, min(planes.sides) // 2)
+        self.gaps: PairsInGaps | None = None
+        if planes.valid is None:
+            contents = [_full_contents(planes, size, longest, cover) for size in sizes.tolist()]
+        else:
+            valid, observed = planes.valid[plane], int(planes.observed[plane])
+            contents = _contents_in_gaps(valid, planes.periodic, observed, sizes, longest)
+            self.gaps = PairsInGaps(valid, planes.rank, int(sizes.max(initial=1)), is_aligned=self.is_aligned)
+        self.contents = dict(zip(sizes.tolist(), contents, strict=True))
+
+    def expected_counts(self, null: RandomCells, sizes: Array) -> Array:
+        """Return the boxes of each size that meet the null."""
+        return null.expected_counts([self.contents[size] for size in sizes.tolist()])
+
+    def covariance(self, null: RandomCells, sizes: Array) -> Array:
+        """Return the covariance of the counts at all pairs of ascending sizes."""
+        contents = [self.contents[size] for size in sizes.tolist()]
+        if self.gaps is not None:
+            return covariance_in_gaps(null, sizes, contents, self.gaps)
+        along = aligned if self.is_aligned else any_place
+        return count_covariance(null, self.sides, sizes, contents, along)
+
+
+def _contents_in_gaps(
+    valid: Array, periodic: Sequence[bool], observed: int, sizes: Array, longest: int
+) -> list[BoxContents]:
+    """Return the contents of the boxes of each size.
+
+    Boxes longer than `longest` are taken to hold as many times more cells than those as they are larger.
     """
-    longest = max(1, min(planes.sides) // 2)
-    if planes.valid is None:
-        return [{size: _full_contents(planes, size, longest, cover) for size in sizes.tolist()}]
-    result = []
-    for valid, observed in zip(planes.valid, planes.observed.tolist(), strict=False):
-        usable = np.unique(np.minimum(sizes, longest)).tolist()
-        values = valid if planes.rank == 2 else valid[0]
-        counts = {size: count_observed(values, size, planes.periodic) for size in usable}
-        contents = {}
-        for size in sizes.tolist():
-            counted, area = min(size, longest), float(size) ** planes.rank
-            numbers = np.flatnonzero(counts[counted][1:]) + 1
-            boxes = counts[counted][numbers]
-            total = float(max(boxes.sum(), 1))
-            contents[size] = BoxContents(
-                np.rint(numbers * (size / counted) ** planes.rank).astype(np.int64),
-                boxes / total,
-                total / area,
-                observed / area,
-            )
-        result.append(contents)
-    return result
+    rank = len(periodic)
+    values = valid if rank == 2 else valid[0]
+    contents = []
+    for size in sizes.tolist():
+        counted, area = min(size, longest), float(size) ** rank
+        counts = count_observed(values, counted, periodic)
+        numbers = np.flatnonzero(counts[1:]) + 1
+        total = float(max(counts[numbers].sum(), 1))
+        cells = np.rint(numbers * (size / counted) ** rank).astype(np.int64)
+        contents.append(BoxContents(cells, counts[numbers] / total, total / area, observed / area))
+    return contents
 
 
 def _full_contents(planes: Planes, size: int, longest: int, cover: str) -> BoxContents:
-    """Return the contents of the boxes of a plane that was observed completely."""
+    """Return the contents of boxes where all was observed; those longer than `longest` count as full."""
     if cover == "aligned":
         places = [np.arange(0, n, size) for n in planes.sides]
         cells = [np.minimum(size, n - start) for n, start in zip(planes.sides, places, strict=True)]
