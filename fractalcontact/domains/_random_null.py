@@ -98,7 +98,7 @@ def any_place(n: int, first: int, second: int) -> Pairs:
     ahead = np.arange(n)  # of the second box
     shared = np.maximum(np.minimum(a, ahead + b) - ahead, 0) + np.maximum(ahead + b - n, 0).clip(max=a)
     cells, number = np.unique(shared, return_counts=True)
-    return np.full(cells.size, a), np.full(cells.size, b), cells, number * (n / (first * second))
+    return np.array(a), np.array(b), cells, number * (n / (first * second))
 
 
 def aligned(n: int, first: int, second: int) -> Pairs:
@@ -280,17 +280,17 @@ def dimension_deviation(
     """Return the standard deviation of the dimension that a fit finds in realisations of the null.
 
     `covariance` is that of the counts at the sizes of index `knots`; between them deviations of ln N are
-    interpolated over ln s. The fit is made one standard deviation to either side along each principal axis
-    of the deviations: the weights of a fit may depend on the counts themselves.
+    interpolated over ln s. The fit is made one standard deviation away along each principal axis of the
+    deviations: the weights of a fit may depend on the counts themselves.
     """
     expected = counts[knots]
     variances, axes = np.linalg.eigh(covariance / np.multiply.outer(expected, expected))
     deviations = axes.T * np.sqrt(np.maximum(variances, 0.0))[:, None]
-    half_differences = []
+    found, differences = dimension(counts), []
     for deviation in deviations:
         ratio = np.exp(np.interp(np.log(sizes), np.log(sizes[knots]), deviation))
-        half_differences.append(0.5 * (dimension(counts * ratio) - dimension(counts / ratio)))
-    return float(np.linalg.norm(half_differences))
+        differences.append(dimension(counts * ratio) - found)
+    return float(np.linalg.norm(differences))
 
 
 def differs_from_null(
