@@ -27,15 +27,20 @@ class ModesMemory:
 
     def __init__(self) -> None:
         self.memory = np.empty(0, np.complex128)
+        self.views: dict[Any, Array | None] = {}  # by shape and type
 
     def array(self, shape: tuple[int, int], dtype: Any) -> Array | None:
         """Return an array for the modes of a real plane; None where the library makes a new one."""
-        if not fft.writes_in_place():
-            return None
+        if (shape, dtype) not in self.views:
+            self.views[shape, dtype] = self._view(shape, dtype) if fft.writes_in_place() else None
+        return self.views[shape, dtype]
+
+    def _view(self, shape: tuple[int, int], dtype: Any) -> Array:
         complex_type, size = np.result_type(dtype, np.complex64), shape[0] * (shape[1] // 2 + 1)
         needed = -(-size * complex_type.itemsize // self.memory.itemsize)
         if self.memory.size < needed:
             self.memory = np.empty(needed, np.complex128)
+            self.views.clear()
         return self.memory.view(complex_type)[:size].reshape(shape[0], -1)
 
 
