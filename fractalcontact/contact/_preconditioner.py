@@ -148,13 +148,13 @@ def precision_for(
     body: Body,
     dtype: Any,
     *,
-    largest: float = 2e4,  # 16384 x 16384 nodes have 1.2e4; 42 x 52 of spacings 1 to 1000, with spikes, did
-    # not converge at 2.6e4
+    # 16384 x 16384 nodes have 1.2e4; 42 x 52 nodes of spacings 1 to 1000, 2.6e4, did not converge in single
+    largest: float = 2e4,
 ) -> Any:
-    """Return the type of the preconditioner: single where its rounding spares the softest mode, else `dtype`.
+    """Return the type of the preconditioner: single where the softest mode stands out of its rounding.
 
-    Single precision rounds by 1e-7 of the stiffest mode, which is `largest` times as stiff as the softest one
-    at most.
+    Single precision rounds by 1e-7 of the stiffest mode. Where that is `largest` times as stiff as the
+    softest or more, the type is `dtype`.
     """
     (ny, nx), (dy, dx) = body.shape, body.spacing
     ratio = max(ny * dy, nx * dx) / 2 * float(np.hypot(1 / dy, 1 / dx))

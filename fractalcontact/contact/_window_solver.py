@@ -26,7 +26,7 @@ import numpy as np
 
 from fractalcontact.base.numbers import Array
 from fractalcontact.contact._constrained_cg import ConstrainedCG, ContactSystem
-from fractalcontact.contact._operator import KEPT, HalfSpaceOperator, Operator, PairSum
+from fractalcontact.contact._operator import KEPT, SINGLE, HalfSpaceOperator, Operator, PairSum
 from fractalcontact.contact._preconditioner import NodePreconditioner, stiffness_table
 from fractalcontact.contact._problem import Body, Control, Problem, Solution
 
@@ -119,7 +119,7 @@ class WindowSolver:
         return replace(solution, pressure=np.where(tiny & is_open, 0.0, pressure))
 
     def state_of(self, solution: Solution) -> Array:
-        """Return the state of `PastStep`: a node by itself moves by its pressure times d, within 4 %."""
+        """Return the state of `PastStep`; one node alone moves by its pressure times the spacing, to 4 %."""
         state = self.problem.gap + solution.displacement
         state -= solution.closure
         state /= -np.sqrt(self.problem.body.spacing[0] * self.problem.body.spacing[1])
@@ -353,8 +353,8 @@ class WindowSolver:
             start = cold_start(self.problem, control)[0]
         part = self.part_inside(window)
         start = start if window == WHOLE_PLANE else start[window]
-        if first_precision(part, control) is np.float32 and self.tolerance < single:
-            run = ConstrainedCG(self.system(part, np.float32), control, start)
+        if first_precision(part, control) is SINGLE and self.tolerance < single:
+            run = ConstrainedCG(self.system(part, SINGLE), control, start)
             del start  # each array that is kept longer than needed adds to the peak of the memory
             rough = run.solve(single, certify=False)
             self.add_work(rough)
@@ -381,7 +381,7 @@ class WindowSolver:
         if dtype in self._systems:
             return self._systems[dtype]
         operator = None
-        if dtype is np.float32 and not part.body.periodic:  # the coefficients are computed once for both
+        if dtype is SINGLE and not part.body.periodic:  # the coefficients are computed once for both
             double = self.system(part, np.float64).operator
             if isinstance(double, HalfSpaceOperator):
                 operator = double.rounded(dtype, double.memory)
@@ -435,4 +435,4 @@ def first_precision(
     load = control.value if control.force is None else control.value / problem.gap.size
     load_fits = 1 / largest < load < largest
     bound_fits = problem.p_max == np.inf or 1 / largest < problem.p_max < largest
-    return np.float32 if load_fits and bound_fits else np.float64
+    return SINGLE if load_fits and bound_fits else np.float64

@@ -152,7 +152,7 @@ def _rings(lnq: Array) -> Array:
 
 
 def _numbered(values: Array) -> tuple[Array, Array]:
-    """Return the whole numbers that are there, ascending, and the place of each value among them."""
+    """Return the whole numbers that are there, and the place of each value: `numpy.unique` without a sort."""
     is_there = np.bincount(values) > 0
     return np.flatnonzero(is_there), np.cumsum(is_there)[values] - 1
 

@@ -40,8 +40,8 @@ _CUBICS = np.array([[0, 6, 0, 0], [-2, -3, 6, -1], [3, -6, 3, 0], [-1, 3, -3, 1]
 # of the spreads of a table: of a first fit, and of the posterior. Near the axes the power of a blur ends at
 # that of the edges, where a cubic needs short steps
 _SPREAD_STEPS = 0.25, 0.1
-# Exponent below which a Gaussian does not count: far below rounding, yet no product of two is denormal, with
-# which processors are ten times slower
+# Exponent below which a Gaussian does not count: far below rounding, yet no product of two is denormal. Such
+# numbers doubled the time of transforms
 FADED = -100.0
 FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
 

@@ -48,7 +48,8 @@ class RandomCells:
         logarithms keeps the digits of q(a + b) - q(a) q(b), a small difference of which there is one for each
         pair of boxes.
         """
-        self.cells, self.observed = cells, observed
+        # of boxes that are apart, q(a + b) - q(a) q(b) is about -a q(a) b q(b) times this
+        self.coupling = cells / (observed * max(observed - cells, 1.0))
         # ln q(m) <= -k m / A, so that further values are below `LEAST_LOG`
         count = np.ceil(min(largest, observed, -LEAST_LOG * observed / max(cells, 1.0)))
         left = observed - np.arange(count)
@@ -72,14 +73,12 @@ class RandomCells:
     def share_variance(self, contents: BoxContents) -> float:
         """Return the variance of the share of boxes of one grid that meet the set.
 
-        Two boxes are missed together a little less often than if they were independent, by about the product
-        of their cells over the number of empty cells.
+        Two boxes are missed together a little less often than if they were independent, see `coupling`.
         """
         region, share = contents.cells, contents.share
         alone = self.miss(region)
-        coupling = self.cells / (self.observed * max(self.observed - self.cells, 1.0))
         independent = share @ (alone * (1.0 - alone)) / contents.boxes
-        return max(float(independent - coupling * (share @ (region * alone)) ** 2), 0.0)
+        return max(float(independent - self.coupling * (share @ (region * alone)) ** 2), 0.0)
 
     def expected_counts(self, contents: Sequence[BoxContents]) -> Array:
         """Return the boxes of each size that meet the set."""
@@ -260,15 +259,13 @@ def covariance_in_gaps(
     null: RandomCells, sizes: Array, contents: Sequence[BoxContents], pairs_of: PairsInGaps
 ) -> Array:
     """Covariance of the counts at all pairs of ascending sizes, on a plane with gaps."""
-    # of boxes that are apart, q(a + b) - q(a) q(b) is -a q(a) b q(b) times this
-    coupling = null.cells / (null.observed * max(null.observed - null.cells, 1.0))
     sums = [of.boxes * float(of.share @ (of.cells * null.miss(of.cells))) for of in contents]
     covariance = np.zeros((sizes.size, sizes.size))
     for i, first in enumerate(sizes.tolist()):
         for j, second in enumerate(sizes[: i + 1].tolist()):
             a, b, shared, number = pairs_of(first, second)
             apart = sums[i] * sums[j] - float(number @ (a * null.miss(a) * b * null.miss(b)))
-            value = float(number @ null.both_empty(a, b, shared)) - coupling * apart
+            value = float(number @ null.both_empty(a, b, shared)) - null.coupling * apart
             covariance[i, j] = covariance[j, i] = value
     counted = np.array([of.measure / of.boxes for of in contents])
     return np.asarray(covariance * counted[:, None] * counted)
