@@ -125,20 +125,14 @@ def area_by_resolution(
     towards, shears = read_direction(direction), float_array(shear)
     loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
     pressing = Pressing.read(
-        crack,
-        WHERE,
-        loads,
-        keep=("state",),
-        influence=influence,
-        hardness=hardness,
-        tolerance=tolerance,
+        crack, WHERE, loads, influence=influence, hardness=hardness, tolerance=tolerance, keep=("state",)
     )
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
     pressed = []
     for factor in np.sort(used):
         coarser = replace(pressing, factor=int(factor))
-        columns = press_sheared(coarser, shears, towards, False)
-        pressed.append(pressed_dataset(coarser, shears, [towards], [columns]).isel(direction=0))
+        columns = press_sheared(coarser, shears, [towards])
+        pressed.append(pressed_dataset(coarser, shears, [towards], columns).isel(direction=0))
     areas = fc.domains.area_dimension([each["state"] for each in pressed])
     result = areas.drop_vars(("run_time", "closure")).drop_attrs(deep=False)
     for name in ("interface_closure", "residual", "converged"):

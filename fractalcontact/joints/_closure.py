@@ -13,14 +13,13 @@ import xarray as xr
 from fractalcontact.base.compass import is_single, read_directions
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
+from fractalcontact.base.schema import DEFAULT_TOLERANCE, STOP_REASONS
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import CLOSURE_FITS, POSITIVE, check_quantities
 from fractalcontact.joints._delta_surface import interpolation_errors
 from fractalcontact.joints._sheared_contact import (
-    BULK,
     PRESSING_BYTES,
     Pressing,
     check_pressing,
@@ -40,8 +39,6 @@ UNDETERMINED = (
 def _check(problems: Problems) -> None:
     check_sliding(problems)
     check_pressing(problems)
-    problems.choices("keep", among=CONTACT_MAPS, optional=True)
-    problems.choice("bulk", among=BULK)
 
 
 @public_result(title="closure of a sheared crack", check=_check, memory=PRESSING_BYTES)
@@ -118,19 +115,10 @@ def closure(
     directions, shears = read_directions(direction), float_array(shear)
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     pressing = Pressing.read(
-        crack,
-        WHERE,
-        loads,
-        bulk=bulk,
-        keep=keep,
-        influence=influence,
-        disc_radius=disc_radius,
-        hardness=hardness,
-        tolerance=tolerance,
-        method=method,
+        crack, WHERE, loads, influence, disc_radius, hardness, tolerance, method, bulk=bulk, keep=keep
     )
-    pressed = [press_sheared(pressing, shears, towards, progress) for towards in directions]
-    result = pressed_dataset(pressing, shears, directions, pressed)
+    columns = press_sheared(pressing, shears, directions, progress)
+    result = pressed_dataset(pressing, shears, directions, columns)
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
     if is_single(direction):
         result = result.isel(direction=0)

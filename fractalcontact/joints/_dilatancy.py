@@ -11,20 +11,19 @@ from fractalcontact.base.compass import COMPASS, Direction, direction_coords, re
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import slopes
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._sheared_contact import (
-    BULK,
     CONTACT_OPTIONS,
     PRESSING_BYTES,
     Pressing,
+    Spring,
     check_pressed,
     check_pressing,
     check_unpressed,
-    press_against_spring,
     press_sheared,
     pressed_dataset,
 )
@@ -44,8 +43,6 @@ def _check(problems: Problems) -> None:
     problems.require(one_of, "pressed", "nothing beside `normal_stiffness`")
     problems.number("normal_stiffness", above=0, optional=True)
     check_pressing(problems)
-    problems.choices("keep", among=CONTACT_MAPS, optional=True)
-    problems.choice("bulk", among=BULK)
 
 
 @public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESSING_BYTES)
@@ -126,28 +123,14 @@ def dilatancy(
     rigid = _rigid_dataset(crack, shears, directions)
     if normal_force is None:
         return rigid
+    load, spring = {"normal_force": normal_force}, None
     pressing = Pressing.read(
-        crack,
-        WHERE,
-        {"normal_force": normal_force},
-        bulk=bulk,
-        keep=keep,
-        influence=influence,
-        disc_radius=disc_radius,
-        hardness=hardness,
-        tolerance=tolerance,
-        method=method,
+        crack, WHERE, load, influence, disc_radius, hardness, tolerance, method, bulk=bulk, keep=keep
     )
-    by_direction = []
-    for towards, lifted in zip(directions, rigid["rigid_dilatancy"].values, strict=True):
-        if normal_stiffness is None:
-            columns = press_sheared(pressing, shears, towards, progress, pressed=pressed)
-        else:
-            stiffness = normal_stiffness * crack.nominal_area
-            columns = press_against_spring(pressing, shears, lifted, towards, stiffness, progress)
-        by_direction.append(columns)
-    has_spring = normal_stiffness is not None
-    under_force = pressed_dataset(pressing, shears, directions, by_direction, has_spring=has_spring)
+    if normal_stiffness is not None:
+        spring = Spring(rigid["rigid_dilatancy"].values, normal_stiffness * crack.nominal_area)
+    columns = press_sheared(pressing, shears, directions, progress, pressed=pressed, spring=spring)
+    under_force = pressed_dataset(pressing, shears, directions, columns, has_spring=spring is not None)
     under_force = under_force.reset_coords("closure").drop_vars(("contact_area", "run_time"))
     result = under_force.merge(rigid, compat="override", combine_attrs="override")
     result["dilatancy"] = result["rigid_dilatancy"] - result["interface_closure"]

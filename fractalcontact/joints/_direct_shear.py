@@ -166,15 +166,8 @@ def direct_shear(
     step = _cell_step(crack, towards)
     assert step is not None
     legs = _legs(_turning_points(path), step)
-    pressing = Pressing.read(
-        crack,
-        WHERE,
-        {"nominal_pressure": nominal_pressure},
-        influence=influence,
-        disc_radius=disc_radius,
-        hardness=hardness,
-        tolerance=tolerance,
-    )
+    load = {"nominal_pressure": nominal_pressure}
+    pressing = Pressing.read(crack, WHERE, load, influence, disc_radius, hardness, tolerance)
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
     spring = 0.0 if normal_stiffness is None else float(normal_stiffness) * area

@@ -18,7 +18,7 @@ from fractalcontact.base.signals import track
 from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
-from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing
+from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing, stacked
 
 if TYPE_CHECKING:
     from fractalcontact.contact.solver import ShearPath
@@ -149,7 +149,7 @@ def partial_slip(
         for value in track(shears, progress, "partial_slip", unit="shear")
     ]
     dims = ("shear", "step", "y", "x")
-    columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+    columns = stacked(rows)
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
     variables |= {
         "nominal_area": crack.nominal_area,

@@ -14,7 +14,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -24,6 +24,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.numbers import Array, number_of_entries
 from fractalcontact.base.provenance import differing
+from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import PAPER, joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
@@ -37,16 +38,9 @@ Columns = dict[str, Array]
 T = TypeVar("T", "Pressed", "Sheared")
 
 # how the faces of the flat block are loaded, and what that makes of the bulk part of the closure
-BULK = {
-    "flat_block": (
-        "rigid",
-        "closure of the flat block under the same force and the same influence coefficients",
-    ),
-    "uniform_pressure": (
-        "uniform",
-        "mean displacement of the flat block under the same force, uniformly spread",
-    ),
-}
+RIGID = "rigid", "closure of the flat block under the same force and the same influence coefficients"
+UNIFORM = "uniform", "mean displacement of the flat block under the same force, uniformly spread"
+BULK = {"flat_block": RIGID, "uniform_pressure": UNIFORM}
 LOADS = ("closure", "normal_force", "nominal_pressure")
 CONTACT_OPTIONS = ("influence", "disc_radius", "hardness", "tolerance", "method")
 # bytes of a cell: the solver of a free body with the steps before (196), delta-surface and flat block
@@ -74,15 +68,15 @@ class Pressing:
         crack: Crack,
         where: str,
         loads: Mapping[str, Any],
-        *,
+        *ordered: Any,
         bulk: str = "flat_block",
         keep: Any = (),
-        **contact_options: Any,
+        **named: Any,
     ) -> Pressing:
-        """Return it from arguments that passed `check_pressing`, with some of `CONTACT_OPTIONS`."""
+        """Return it from arguments that passed `check_pressing`; `CONTACT_OPTIONS` in order, or named."""
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-        options = ContactOptions(_boundary(crack), **contact_options)
+        options = ContactOptions(_boundary(crack), *ordered, **named)
         return cls(crack, where, LoadPath.among(loads), options, bulk, word_tuple(keep))
 
     @property
@@ -122,6 +116,9 @@ def check_pressing(problems: Problems, **replaced: Any) -> LoadPath | None:
     arguments, crack = vars(problems.given) | replaced, problems.given.crack
     load = problems.construct(LoadPath.among, arguments)
     options = problems.construct(ContactOptions.among, arguments)
+    if "bulk" in arguments:
+        problems.choices("keep", among=CONTACT_MAPS, optional=True)
+        problems.choice("bulk", among=BULK)
     if options is None or not isinstance(crack, Crack):
         return load
     layout = crack.layout
@@ -205,68 +202,73 @@ class ShearedContact:
             raise InvalidInput(pressing.where, lines) from error
 
 
+class Spring(NamedTuple):
+    """A spring above the block: the rigid dilatancy against it, m, shape (direction, shear), and k A, N/m."""
+
+    dilatancy: Array
+    stiffness: float
+
+
 def press_sheared(
     pressing: Pressing,
     shears: Array,
-    towards: Direction,
-    progress: bool,
+    directions: Sequence[Direction],
+    progress: bool = False,
     *,
     pressed: xr.Dataset | None = None,
+    spring: Spring | None = None,
 ) -> Columns:
-    """Press the crack together at every shear along the same path of load.
+    """Press the crack together at every shear along the same path of load, or against a spring.
 
     What a result of `closure` has `pressed` already is taken from it.
 
     Returns
     -------
     dict of ndarray
-        As `ShearedContact.press`, with the shear as first axis.
+        As `ShearedContact.press`, with direction and shear as first axes.
     """
-    results = []
-    for shear in track(shears, progress, f"press, towards {towards.name}", unit="shear"):
-        columns = None if pressed is None else _held_columns(pressed, shear, towards, pressing.load)
-        if columns is None:
-            contact = ShearedContact.of_crack(pressing, float(shear), towards)
-            columns = contact.press(pressing.load, pressing.keep)
-        results.append(columns)
-    return {name: np.stack([result[name] for result in results]) for name in results[0]}
+    from fractalcontact.contact import solver
+
+    by_direction = []
+    for i, towards in enumerate(directions):
+        rows, at_rest = [], None
+        if spring is not None:
+            at_rest = ShearedContact.of_crack(pressing, 0.0, towards).press(pressing.load)
+        for j, shear in enumerate(track(shears, progress, f"press, towards {towards.name}", unit="shear")):
+            columns = None if pressed is None else _held_columns(pressed, shear, towards, pressing.load)
+            if columns is None:
+                contact = ShearedContact.of_crack(pressing, float(shear), towards)
+                if spring is None or at_rest is None:
+                    columns = contact.press(pressing.load, pressing.keep)
+                else:
+                    openings = spring.dilatancy[i, j] + at_rest["interface_closure"]
+                    columns = press_against_spring(contact, openings, spring.stiffness)
+            rows.append(columns)
+        by_direction.append(stacked(rows))
+    columns = stacked(by_direction)
+    solver.warn_steep(f"{pressing.where}: the delta-surface", float(columns["rms_slope"].max()))
+    return columns
 
 
-def press_against_spring(
-    pressing: Pressing, shears: Array, lifted: Array, towards: Direction, stiffness: float, progress: bool
-) -> Columns:
-    """Press the crack together at every shear against a spring.
+def stacked(rows: Sequence[Columns]) -> Columns:
+    """Return the columns of several solutions with a first axis over them."""
+    return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
+
+
+def press_against_spring(contact: ShearedContact, openings: Array, stiffness: float) -> Columns:
+    """Press the crack together at one shear against a spring of stiffness k A, N/m.
 
     The force on the block is N = N0 + k A (delta(N, v) - delta(N0, 0)), and never below zero. For every
     initial force N0 it is bracketed and solved (Brent): the closure grows with the force, so that the
-    difference of the two sides changes its sign once.
-
-    Parameters
-    ----------
-    lifted : ndarray, shape (shear,)
-        Rigid dilatancy, m.
-    stiffness : float
-        k A, N/m.
-
-    Returns
-    -------
-    dict of ndarray
-        As `press_sheared`; normal_force and all that depends on it differ from shear to shear.
+    difference of the two sides changes its sign once. `openings` are those of the rigid faces from
+    delta(N0, 0) on, m.
     """
-    at_rest = ShearedContact.of_crack(pressing, 0.0, towards).press(pressing.load)
-    initial_dilatancy = -at_rest["interface_closure"]
-    results = []
-    for shear, lift in zip(
-        track(shears, progress, f"press, towards {towards.name}", unit="shear"), lifted, strict=True
-    ):
-        contact = ShearedContact.of_crack(pressing, float(shear), towards)
-        steps = [
-            _press_balanced(contact, float(force), float(lift - initial), stiffness)
-            for force, initial in zip(pressing.load.values, initial_dilatancy, strict=True)
-        ]
-        slope = {"rms_slope": steps[0].pop("rms_slope")}
-        results.append(slope | {name: np.concatenate([step[name] for step in steps]) for name in steps[0]})
-    return {name: np.stack([result[name] for result in results]) for name in results[0]}
+    steps = [
+        _press_balanced(contact, float(force), float(opening), stiffness)
+        for force, opening in zip(contact.pressing.load.values, openings, strict=True)
+    ]
+    slope = {"rms_slope": steps[0].pop("rms_slope")}
+    return slope | {name: np.concatenate([step[name] for step in steps]) for name in steps[0]}
 
 
 def _press_balanced(
@@ -312,9 +314,8 @@ def check_pressed(problems: Problems) -> None:
     entry = provenance_of(given.pressed) if isinstance(given.pressed, xr.Dataset) else {}
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
     if problems.require(is_closure, "pressed", expected) and isinstance(given.crack, Crack):
-        others = differing(
-            entry, {name: getattr(given, name) for name in ("crack", "bulk", *CONTACT_OPTIONS)}
-        )
+        wanted = {name: getattr(given, name) for name in ("crack", "bulk", *CONTACT_OPTIONS)}
+        others = differing(entry, wanted)
         problems.require(not others, "pressed", expected, f"one with another {', '.join(others)}")
     problems.require(number_of_entries(given.keep) == 0, "pressed", "nothing beside `keep`")
 
@@ -339,47 +340,37 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     return columns | {"rms_slope": at_load["rms_slope"].values, "solver": np.full(len(steps), "as pressed")}
 
 
-def over_directions(pressing: Pressing, pressed: Sequence[Columns]) -> Columns:
-    """Return columns with the direction as first axis; warn of steep delta-surfaces."""
-    from fractalcontact.contact import solver
-
-    stacked = {name: np.stack([columns[name] for columns in pressed]) for name in pressed[0]}
-    what, slope = f"{pressing.where}: the delta-surface", float(stacked["rms_slope"].max())
-    solver.warn_steep(what, slope)
-    return stacked
-
-
 def pressed_dataset(
     pressing: Pressing,
     shears: Array,
     directions: Sequence[Direction],
-    pressed: Sequence[Columns],
+    columns: Columns,
     *,
     has_spring: bool = False,
 ) -> xr.Dataset:
-    """Return the columns of every direction over (direction, shear, step), and maps over (..., y, x).
+    """Return the columns of `press_sheared` over (direction, shear, step), and maps over (..., y, x).
 
     Without a spring the prescribed load is the same at every shear, and a coordinate of `step` alone.
     """
     from fractalcontact.contact import solver
 
-    crack, load, stacked = pressing.crack, pressing.load, over_directions(pressing, pressed)
+    crack, load = pressing.crack, pressing.load
     dims = ("direction", "shear", "step", "y", "x")
-    variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in stacked.items()}
+    variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
     solvers = variables.pop("solver")[1]
     coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
     if not has_spring:
         imposed = ("closure",) if load.control == "closure" else ("normal_force", "nominal_pressure")
-        coords |= {name: ("step", stacked[name][0, 0]) for name in imposed}
+        coords |= {name: ("step", columns[name][0, 0]) for name in imposed}
         coords[load.control] = ("step", np.array(load.values))  # as given, without rounding
-    coords |= {"shear": ("shear", shears), "step": np.arange(stacked["closure"].shape[2])}
+    coords |= {"shear": ("shear", shears), "step": np.arange(columns["closure"].shape[2])}
     coords |= direction_coords(directions)
-    if any(values.ndim > 3 for values in stacked.values()):
+    if any(values.ndim > 3 for values in columns.values()):
         every = slice(None, None, pressing.factor)
         coords |= {dim: values[every] for dim, values in block_coords(crack).items()}
     result = xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
     result["bulk_closure"].attrs["comment"] = BULK[pressing.bulk][1]
-    residual = float(np.max(stacked["residual"]))
+    residual = float(np.max(columns["residual"]))
     stated = {"references": pressing.references, **pressing.options.stated_on(pressing.grid)}
     stated["solver"] = solver.solvers_in_words(solvers.ravel().tolist())
     result.attrs.update(stated, achieved_residual=residual)

@@ -25,7 +25,6 @@ from fractalcontact.joints._sheared_contact import (
     Pressing,
     check_pressing,
     check_unpressed,
-    over_directions,
     press_sheared,
 )
 
@@ -141,8 +140,7 @@ def self_weight(
         pressing = Pressing.read(
             crack, WHERE, forces, influence=influence, hardness=hardness, tolerance=tolerance
         )
-        pressed = [press_sheared(pressing, shears, towards, False) for towards in directions]
-        columns = over_directions(pressing, pressed)
+        columns = press_sheared(pressing, shears, directions)
         opening -= columns["interface_closure"]
         for name in ("residual", "converged", "rms_slope"):
             variables[name] = dims[: columns[name].ndim], columns[name]
