@@ -151,8 +151,9 @@ def friction(
     """
     name, shears = _dilatancy_name(dilatancy), _shears(dilatancy)
     basic_angle = float(_basic_angle(dilatancy, basic_friction_angle))
-    opening = drop_unknown_coords(dilatancy[name]).drop_attrs()
-    lift = opening.copy(data=work_per_force(dilatancy, form))
+    given = drop_unknown_coords(dilatancy[name]).drop_attrs()
+    opening = given.transpose("shear", ...)
+    lift = opening.copy(data=work_per_force(dilatancy, opening, form))
     result = xr.Dataset({"dilatancy_angle": _angle(opening, smoothing)})
     if form == "energy":
         result["frictionless_angle"] = _angle(lift, smoothing)
@@ -171,13 +172,15 @@ def friction(
     result = result.assign(_peaks(secants, pressure, length).data_vars)
     _, lengths = dilatancy_slopes(shears, np.zeros((shears.size, 1)), smoothing)
     result["basic_friction_angle"], result["smoothing"] = basic_angle, ("shear", lengths)
-    result = result.assign_attrs(slope_of=name)
+    place = given.dims.index("shear")
+    order = (*given.dims[:place], "distance", *given.dims[place:])
+    result = result.transpose(*order, ..., missing_dims="ignore").assign_attrs(slope_of=name)
     result["friction_angle"].attrs["comment"] = FORMS[form]
     _explain(result, secants)
     return result
 
 
-def work_per_force(dilatancy: xr.Dataset, form: str) -> Array:
+def work_per_force(dilatancy: xr.Dataset, opening: xr.DataArray, form: str) -> Array:
     """Return the curve (m) whose slope is T/N, the tangent of the angle at which the faces climb.
 
     That is the dilatancy, or in the energy form the work of the horizontal force T of faces without friction
@@ -185,34 +188,29 @@ def work_per_force(dilatancy: xr.Dataset, form: str) -> Array:
     follows d delta + dU/N for a constant N. If N varies (a spring), the flat block alone has the closure w_b
     = N/k and the energy N w_b/2, and N dw_b = d(N w_b/2): both parts of the block are left out.
     """
-    name = _dilatancy_name(dilatancy)
-    opening = dilatancy[name]
+    curve = np.asarray(opening.values, dtype=np.float64)
     if form == "kinematic":
-        return np.asarray(opening.values, dtype=np.float64)
+        return curve
     force, bulk, energy = (
         dilatancy[each].broadcast_like(opening).transpose(*opening.dims).values for each in ENERGIES
     )
-    axis = opening.dims.index("shear")
     # T/N = d delta/dv + (1/N) d(U - N w_b/2)/dv
-    force, stored = np.moveaxis(force, axis, 0), np.moveaxis(energy - 0.5 * force * bulk, axis, 0)
+    stored = energy - 0.5 * force * bulk
     mean_force = 0.5 * (force[1:] + force[:-1])
     no_work = np.zeros_like(mean_force)  # faces that do not touch store nothing
     steps = np.divide(np.diff(stored, axis=0), mean_force, out=no_work, where=mean_force > 0)
-    work = np.concatenate([np.zeros_like(force[:1]), np.cumsum(steps, axis=0)])
-    return np.asarray(opening.values + np.moveaxis(work, 0, axis))
+    return np.concatenate([curve[:1], curve[1:] + np.cumsum(steps, axis=0)])
 
 
 def _angle(lift: xr.DataArray, smoothing: float | None) -> xr.DataArray:
-    """Return the angle (degree) of a curve over (..., shear, ...)."""
-    curves = lift.transpose("shear", ...)
-    slopes, _ = dilatancy_slopes(_shears(lift), curves.values.reshape(curves.sizes["shear"], -1), smoothing)
-    angle = curves.copy(data=np.degrees(np.arctan(slopes)).reshape(curves.shape))
-    return angle.transpose(*lift.dims)
+    """Return the angle (degree) of a curve over (shear, ...)."""
+    slopes, _ = dilatancy_slopes(_shears(lift), lift.values.reshape(lift.sizes["shear"], -1), smoothing)
+    return lift.copy(data=np.degrees(np.arctan(slopes)).reshape(lift.shape))
 
 
 def _strength(angle: xr.DataArray, pressure: xr.DataArray) -> xr.DataArray:
     tangent = angle.copy(data=np.tan(np.radians(angle.where(angle < 90.0).values)))
-    return (tangent * pressure).transpose(..., "step", missing_dims="ignore")
+    return tangent * pressure
 
 
 def default_distance(dilatancy: xr.Dataset, shears: Array) -> float:
@@ -224,7 +222,7 @@ def default_distance(dilatancy: xr.Dataset, shears: Array) -> float:
 
 
 def _secant_angles(lift: xr.DataArray, length: float) -> xr.DataArray:
-    """Return the angle of the secant from every shear v to v + distance, over (..., distance, shear, ...).
+    """Return the angle of the secant from every shear v to v + distance, over (distance, shear, ...).
 
     The distances are `length`, halved and doubled as often as the shears resolve.
     """
@@ -232,18 +230,10 @@ def _secant_angles(lift: xr.DataArray, length: float) -> xr.DataArray:
     candidates = length * 2.0 ** np.arange(-20, 21)  # a million times: more than any path of shears resolves
     finest, reach = np.diff(shears).min() / ROUNDED, np.ptp(shears) * ROUNDED
     candidates = candidates[(candidates == length) | ((candidates >= finest) & (candidates <= reach))]
-    resolved = np.isfinite(secant_slopes(shears, shears[:, None], candidates)).any(axis=(1, 2))
+    resolved = np.isfinite(secant_slopes(shears, shears, candidates)).any(axis=1)
     distances = candidates[resolved | (candidates == length)]
-    curves = lift.transpose("shear", ...)
-    slopes = secant_slopes(shears, curves.values.reshape(shears.size, -1), distances)
-    shape = (distances.size, *curves.shape)
-    angles = xr.DataArray(
-        np.degrees(np.arctan(slopes)).reshape(shape),
-        dims=("distance", *curves.dims),
-        coords={**curves.coords, "distance": distances},
-    )
-    place = lift.dims.index("shear")
-    return angles.transpose(*lift.dims[:place], "distance", *lift.dims[place:])
+    angles = np.degrees(np.arctan(secant_slopes(shears, lift.values, distances)))
+    return xr.DataArray(angles, {**lift.coords, "distance": distances}, ("distance", *lift.dims))
 
 
 def secant_slopes(shears: Array, curves: Array, distances: Array) -> Array:
@@ -253,13 +243,12 @@ def secant_slopes(shears: Array, curves: Array, distances: Array) -> Array:
     ----------
     shears : ndarray, shape (n,)
         Ascending.
-    curves : ndarray, shape (n, m)
-        One curve in each column.
+    curves : ndarray, shape (n, ...)
     distances : ndarray, shape (k,)
 
     Returns
     -------
-    ndarray, shape (k, n, m)
+    ndarray, shape (k, n, ...)
         NaN where the curve ends before v + distance, or a step of shear on the way is longer than the
         distance.
     """
@@ -290,8 +279,7 @@ def _peaks(secants: xr.DataArray, pressure: xr.DataArray | None, length: float) 
         columns["shear_strength"] = _strength(secants, pressure)
     result = xr.Dataset({"peak_distance": length})
     for name, values in columns.items():
-        greatest = values.max("shear").where(~locked).transpose(*[d for d in values.dims if d != "shear"])
-        result[f"secant_{name}"] = greatest
+        result[f"secant_{name}"] = greatest = values.max("shear").where(~locked)
         place = values.fillna(-np.inf).argmax("shear")
         shear = values["shear"].isel(shear=place).drop_vars("shear").where(greatest.notnull())
         of_peak = "peak_shear" if name == "friction_angle" else "peak_strength_shear"
@@ -302,12 +290,12 @@ def _peaks(secants: xr.DataArray, pressure: xr.DataArray | None, length: float) 
 
 def _secant_means(values: xr.DataArray, distances: Array) -> xr.DataArray:
     """Return the mean of values over (..., shear, ...) from every shear v to v + distance."""
-    curves = values.transpose("shear", ...)
-    shears, table = _shears(values), curves.values.reshape(curves.sizes["shear"], -1)
-    integral = np.zeros_like(table)
-    integral[1:] = np.cumsum(0.5 * np.diff(shears)[:, None] * (table[1:] + table[:-1]), axis=0)
-    means = secant_slopes(shears, integral, distances).reshape(distances.size, *curves.shape)
-    return xr.DataArray(means, dims=("distance", *curves.dims), coords={"distance": distances})
+    from scipy.integrate import cumulative_trapezoid
+
+    curves, shears = values.transpose("shear", ...), _shears(values)
+    integral = cumulative_trapezoid(curves.values, shears, axis=0, initial=0)
+    means = secant_slopes(shears, integral, distances)
+    return xr.DataArray(means, {"distance": distances}, ("distance", *curves.dims))
 
 
 def _shears(curve: xr.DataArray | xr.Dataset) -> Array:
