@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -171,20 +170,19 @@ def direct_shear(
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
     spring = 0.0 if normal_stiffness is None else float(normal_stiffness) * area
-    tests = [
-        _test(WornJoint(pressing, towards), legs, float(pressure) * area, spring, progress)
-        for pressure in pressures
-    ]
+    joints = [WornJoint(pressing, towards) for _ in pressures]
+    for joint, pressure in zip(joints, pressures, strict=True):
+        _test(joint, legs, float(pressure) * area, spring, progress)
     length = max(PEAK_SHARE * math.sqrt(area), 2 * step) if distance is None else float(distance)
-    result = _dataset(crack, tests, legs, pressures, shear_stiffness, min(length, float(np.ptp(legs[0]))))
+    result = _dataset(crack, joints, legs, pressures, shear_stiffness, min(length, float(np.ptp(legs[0]))))
     for name, index in zip(MAPS, (0, 1), strict=True):
         if name in names:
-            faces = np.stack([test.joint.faces()[index].values for test in tests])
+            faces = np.stack([joint.faces()[index].values for joint in joints])
             coords = {dim: crack.lower.coords[dim].variable for dim in ("y", "x")}
             result[name] = ("nominal_pressure", "y", "x"), faces
             result = result.assign_coords(coords)
-    residual = max(test.joint.residual for test in tests)
-    _warn([test.joint for test in tests])
+    residual = max(joint.residual for joint in joints)
+    _warn(joints)
     references = joined_references(PATTON, pressing.references)
     return result.assign_attrs(references=references, achieved_residual=residual)
 
@@ -225,28 +223,13 @@ def _legs(turning_points: Array, step: float) -> list[Array]:
     return [step * np.arange(a, b + np.sign(b - a), np.sign(b - a)) for a, b in itertools.pairwise(cells)]
 
 
-@dataclass
-class ShearTest:
-    """A test of one joint: what is reported of every position, and the elastic shear stiffness, Pa/m.
-
-    `reason` says why it ended before the path did.
-    """
-
-    joint: WornJoint
-    rows: list[dict[str, float]]
-    shear_stiffness: float
-    reason: str = ""
-
-
-def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, progress: bool) -> ShearTest:
+def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, progress: bool) -> None:
     """Shear a joint along the legs, from a normal force (N) on and against a spring (N/m)."""
     friction = math.tan(math.radians(joint.crack.basic_friction_angle))
     state = joint.press(joint.contact(0.0), force)
     joint.wear(0.0, state)
     first, load = state.height, force
-    test = ShearTest(
-        joint, [joint.report(state, first) | _stresses(joint, force, 0.0, math.nan, 1)], math.inf
-    )
+    joint.rows.append(joint.report(state, first) | _stresses(joint, force, 0.0, math.nan, 1))
 
     def normal_force(height: float) -> float:
         # a spring may unload the block entirely; 1e-8 and 1e-4 gave the same
@@ -257,17 +240,16 @@ def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, 
     for (here, there), begins in track(pairs, progress, f"shear under {force:g} N", unit="cell", total=total):
         step = balanced_step(joint, here, there, load, friction, normal_force)
         if isinstance(step, str):
-            test.reason = step
+            joint.reason = step
             break
         rise = (step.state.height - state.height) / abs(there - here)
         stresses = _stresses(joint, *step.forces(friction), rise, 1 if there > here else -1)
         if begins:  # the stress changes before the block moves
-            test.rows.append(test.rows[-1] | stresses)
-        test.rows.append(joint.report(step.state, first) | stresses)
-        if not math.isfinite(test.shear_stiffness):
-            test.shear_stiffness = shear_stiffness(joint, there, step.load)
+            joint.rows.append(joint.rows[-1] | stresses)
+        joint.rows.append(joint.report(step.state, first) | stresses)
+        if not math.isfinite(joint.shear_stiffness):
+            joint.shear_stiffness = shear_stiffness(joint, there, step.load)
         state, load = step.state, step.load
-    return test
 
 
 def _stresses(
@@ -285,7 +267,7 @@ def _stresses(
 
 def _dataset(
     crack: Crack,
-    tests: Sequence[ShearTest],
+    joints: Sequence[WornJoint],
     legs: Sequence[Array],
     pressures: Array,
     shear_stiffness: float | None,
@@ -293,13 +275,12 @@ def _dataset(
 ) -> xr.Dataset:
     """Return the rows of all tests over (nominal_pressure, point), with peaks and displacements."""
     dims, positions = ("nominal_pressure", "point"), np.concatenate([[0.0], *legs])
-    columns = {name: np.full((pressures.size, positions.size), np.nan) for name in tests[0].rows[0]}
-    for i, test in enumerate(tests):
+    columns = {name: np.full((pressures.size, positions.size), np.nan) for name in joints[0].rows[0]}
+    for i, joint in enumerate(joints):
         for name, values in columns.items():
-            values[i, : len(test.rows)] = [row[name] for row in test.rows]
-    stiffness = np.array(
-        [test.shear_stiffness if shear_stiffness is None else shear_stiffness for test in tests]
-    )
+            values[i, : len(joint.rows)] = [row[name] for row in joint.rows]
+    own = np.array([joint.shear_stiffness for joint in joints])
+    stiffness = own if shear_stiffness is None else np.full(own.shape, float(shear_stiffness))
     finite = np.where(np.isfinite(stiffness), stiffness, np.nan)
     variables: dict[str, Any] = {name: (dims, values) for name, values in columns.items()}
     elastic = np.where(np.isfinite(stiffness)[:, None], columns["shear_stress"] / stiffness[:, None], 0.0)
@@ -313,7 +294,7 @@ def _dataset(
     result = xr.Dataset(variables, {"nominal_pressure": pressures, "point": np.arange(positions.size)})
     if np.isnan(columns["shear_stress"]).any():
         for name in (*columns, *peaks, "shear_displacement"):
-            result[name].attrs["reason"] = "; ".join(sorted({test.reason for test in tests} - {""}))
+            result[name].attrs["reason"] = "; ".join(sorted({joint.reason for joint in joints} - {""}))
     return result.transpose("point", "nominal_pressure")
 
 

@@ -64,6 +64,8 @@ class WornJoint:
         self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
         self.residual, self.steepest, self.plastic_work = 0.0, 0.0, 0.0
         self.unconverged = 0
+        self.rows: list[dict[str, float]] = []  # what is reported of every position
+        self.shear_stiffness, self.reason = math.inf, ""  # elastic, Pa/m; why the test ended before the path
 
     def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
         """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
