@@ -18,13 +18,7 @@ from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
-from fractalcontact.joints._sheared_contact import (
-    PRESSING_BYTES,
-    Pressing,
-    check_pressing,
-    press_sheared,
-    pressed_dataset,
-)
+from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, check_pressing, pressed_dataset
 
 WHERE = "fractalcontact.joints.area_by_resolution"
 
@@ -47,10 +41,8 @@ def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> 
         valid = (values == np.round(values)) & (values <= largest)
         divides = [all(n % int(value) == 0 for n in cells) for value in np.where(valid, values, 1)]
         several = values.size > 1 and np.unique(values).size == values.size
-        expected = (
-            f"at least two different divisors of the {cells[0]} x {cells[1]} cells of the block, "
-            f"1 to {largest}"
-        )
+        block = f"{cells[0]} x {cells[1]} cells of the block"
+        expected = f"at least two different divisors of the {block}, 1 to {largest}"
         problems.require(several and bool(valid.all()) and all(divides), "factors", expected, factors)
 
 
@@ -131,8 +123,7 @@ def area_by_resolution(
     pressed = []
     for factor in np.sort(used):
         coarser = replace(pressing, factor=int(factor))
-        columns = press_sheared(coarser, shears, [towards])
-        pressed.append(pressed_dataset(coarser, shears, [towards], columns).isel(direction=0))
+        pressed.append(pressed_dataset(coarser, shears, [towards]).isel(direction=0))
     areas = fc.domains.area_dimension([each["state"] for each in pressed])
     result = areas.drop_vars(("run_time", "closure")).drop_attrs(deep=False)
     for name in ("interface_closure", "residual", "converged"):

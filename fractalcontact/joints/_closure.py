@@ -19,13 +19,7 @@ from fractalcontact.joints import _criteria
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import CLOSURE_FITS, POSITIVE, check_quantities
 from fractalcontact.joints._delta_surface import interpolation_errors
-from fractalcontact.joints._sheared_contact import (
-    PRESSING_BYTES,
-    Pressing,
-    check_pressing,
-    press_sheared,
-    pressed_dataset,
-)
+from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, check_pressing, pressed_dataset
 
 Path = float | Sequence[float] | Array
 
@@ -117,8 +111,7 @@ def closure(
     pressing = Pressing.read(
         crack, WHERE, loads, influence, disc_radius, hardness, tolerance, method, bulk=bulk, keep=keep
     )
-    columns = press_sheared(pressing, shears, directions, progress)
-    result = pressed_dataset(pressing, shears, directions, columns)
+    result = pressed_dataset(pressing, shears, directions, progress)
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
     if is_single(direction):
         result = result.isel(direction=0)
@@ -147,12 +140,9 @@ def _check_bandis(problems: Problems) -> None:
         problems.require(weakest, "wall_strength", "at most compressive_strength")
     joint = {name: value for name, value in vars(given).items() if name != "nominal_pressure"}
     opening, stiffness, closure = _criteria.bandis_constants(**joint)
-    problems.require(
-        stiffness > 0 and 0 < closure <= opening,
-        "roughness_coefficient, wall_strength, aperture",
-        "values inside the range of the fit",
-        f"{stiffness / 1e9:.3g} MPa/mm and {closure * 1e3:.3g} mm",
-    )
+    is_inside = stiffness > 0 and 0 < closure <= opening
+    names, expected = "roughness_coefficient, wall_strength, aperture", "values inside the range of the fit"
+    problems.require(is_inside, names, expected, f"{stiffness / 1e9:.3g} MPa/mm and {closure * 1e3:.3g} mm")
 
 
 @public_result(

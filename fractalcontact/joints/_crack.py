@@ -303,20 +303,15 @@ def _check_heights(problems: Problems, argument: str, face: xr.DataArray, layout
 
 def _check_upper(problems: Problems, upper: xr.DataArray, lower: xr.DataArray, layout: Block | None) -> None:
     grid = read_grid(lower)
-    if not problems.require(
-        upper.shape == grid.shape, "upper", f"the shape of lower, {grid.shape}", upper.shape
-    ):
+    expected = f"the shape of lower, {grid.shape}"
+    if not problems.require(upper.shape == grid.shape, "upper", expected, upper.shape):
         return
     aligned = True
     for axis, name in enumerate(("y", "x")):
         distance = np.abs(upper[name].values - lower[name].values).max()
         allowed = UNIFORM * grid.spacing[axis] + 4.0 * np.spacing(np.abs(lower[name].values).max())
-        aligned &= problems.require(
-            bool(distance <= allowed),
-            f"upper.{name}",
-            f"the positions of lower.{name}",
-            f"up to {distance:g} m off",
-        )
+        expected, got = f"the positions of lower.{name}", f"up to {distance:g} m off"
+        aligned &= problems.require(bool(distance <= allowed), f"upper.{name}", expected, got)
     if aligned and layout is not None:
         _check_heights(problems, "upper", upper, layout)
 

@@ -21,10 +21,8 @@ from fractalcontact.joints._sheared_contact import (
     PRESSING_BYTES,
     Pressing,
     Spring,
-    check_pressed,
     check_pressing,
     check_unpressed,
-    press_sheared,
     pressed_dataset,
 )
 
@@ -38,7 +36,6 @@ def _check(problems: Problems) -> None:
         unused = ("normal_stiffness", "pressed", "bulk", "keep", *CONTACT_OPTIONS)
         check_unpressed(problems, dilatancy, unused)
         return
-    check_pressed(problems)
     one_of = given.normal_stiffness is None or given.pressed is None
     problems.require(one_of, "pressed", "nothing beside `normal_stiffness`")
     problems.number("normal_stiffness", above=0, optional=True)
@@ -129,8 +126,7 @@ def dilatancy(
     )
     if normal_stiffness is not None:
         spring = Spring(rigid["rigid_dilatancy"].values, normal_stiffness * crack.nominal_area)
-    columns = press_sheared(pressing, shears, directions, progress, pressed=pressed, spring=spring)
-    under_force = pressed_dataset(pressing, shears, directions, columns, has_spring=spring is not None)
+    under_force = pressed_dataset(pressing, shears, directions, progress, pressed=pressed, spring=spring)
     under_force = under_force.reset_coords("closure").drop_vars(("contact_area", "run_time"))
     result = under_force.merge(rigid, compat="override", combine_attrs="override")
     result["dilatancy"] = result["rigid_dilatancy"] - result["interface_closure"]

@@ -134,7 +134,9 @@ def register(
     y, x = np.indices(low.shape, dtype=float)
     tilt_plane = pose.slope[0] * y + pose.slope[1] * x
     moved += tilt_plane - tilt_plane[np.isfinite(moved - low)].mean()  # none over the common part
-    _warn_uncertain(pose)
+    if pose.error > 1.0:
+        message = f"{WHERE}: position not determined, only to {pose.error:.2g} points: do the faces belong "
+        warn(message + "together, turned by a few degrees at most?", ConvergenceWarning)
     result = _dataset(lower, low, moved, pose, grid)
     if turn_upper is None:
         _refuse_swapped_faces(result)
@@ -177,16 +179,6 @@ def _refuse_swapped_faces(result: xr.Dataset, overlap: float = 0.5) -> None:
             "own, raise upper by the aperture)"
         )
         raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got a mean aperture of {mean:.3g} m"])
-
-
-def _warn_uncertain(pose: Pose) -> None:
-    """Warn of a position that is not determined to a point."""
-    if pose.error > 1.0:
-        message = (
-            f"{WHERE}: position not determined, only to {pose.error:.2g} points: do the faces belong "
-            "together, turned by a few degrees at most?"
-        )
-        warn(message, ConvergenceWarning)
 
 
 def _dataset(lower: xr.DataArray, low: Array, moved: Array, pose: Pose, grid: Grid) -> xr.Dataset:

@@ -119,6 +119,8 @@ def check_pressing(problems: Problems, **replaced: Any) -> LoadPath | None:
     if "bulk" in arguments:
         problems.choices("keep", among=CONTACT_MAPS, optional=True)
         problems.choice("bulk", among=BULK)
+    if arguments.get("pressed") is not None:
+        _check_pressed(problems)
     if options is None or not isinstance(crack, Crack):
         return load
     layout = crack.layout
@@ -305,11 +307,9 @@ def _press_balanced(
     return press(float(force), contact.pressing.keep)
 
 
-def check_pressed(problems: Problems) -> None:
-    """Check that `pressed`, if any, is a result of `closure` for this crack, pressed in this way."""
+def _check_pressed(problems: Problems) -> None:
+    """Check that `pressed` is a result of `closure` for this crack, pressed in this way."""
     given = problems.given
-    if given.pressed is None:
-        return
     expected = "a result of `joints.closure` for the same crack, bulk part and solver"
     entry = provenance_of(given.pressed) if isinstance(given.pressed, xr.Dataset) else {}
     is_closure = entry.get("call") == "fractalcontact.joints.closure"
@@ -344,9 +344,10 @@ def pressed_dataset(
     pressing: Pressing,
     shears: Array,
     directions: Sequence[Direction],
-    columns: Columns,
+    progress: bool = False,
     *,
-    has_spring: bool = False,
+    pressed: xr.Dataset | None = None,
+    spring: Spring | None = None,
 ) -> xr.Dataset:
     """Return the columns of `press_sheared` over (direction, shear, step), and maps over (..., y, x).
 
@@ -355,11 +356,12 @@ def pressed_dataset(
     from fractalcontact.contact import solver
 
     crack, load = pressing.crack, pressing.load
+    columns = press_sheared(pressing, shears, directions, progress, pressed=pressed, spring=spring)
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
     solvers = variables.pop("solver")[1]
     coords: dict[str, Any] = {name: variables.pop(name) for name in LOADS}
-    if not has_spring:
+    if spring is None:
         imposed = ("closure",) if load.control == "closure" else ("normal_force", "nominal_pressure")
         coords |= {name: ("step", columns[name][0, 0]) for name in imposed}
         coords[load.control] = ("step", np.array(load.values))  # as given, without rounding

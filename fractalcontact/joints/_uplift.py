@@ -21,7 +21,7 @@ from fractalcontact.joints._flow_network import Held, Network
 from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
 
 WHERE = "fractalcontact.joints.uplift"
-EDGES = {"W": ("x", False), "E": ("x", True), "S": ("y", False), "N": ("y", True)}  # axis, is at its far end
+EDGES = {"W": (1, False), "E": (1, True), "S": (0, False), "N": (0, True)}  # axis, is at its far end
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
 LARGEST = 1e12  # Pa or m: far beyond water and dams; products do not overflow
 
@@ -196,7 +196,8 @@ def uplift(
     grid, low = read_grid(gap), float(downstream_pressure)
     drop = upstream_pressure - low
     drained = 0.0 if drain_pressure is None else (drain_pressure - low) / drop
-    is_drain = _drain_cells(gap, grid, drains, drain_diameter)
+    points = np.asarray([] if drains is None else drains, dtype=np.float64).reshape(-1, 2)  # (x, y)
+    is_drain = _drain_cells(gap, grid, points, drain_diameter)
     flow = HeldFlow(grid, _sides(upstream, downstream, gap), is_drain, drained)
     if total_stress is not None:
         gap = gap.transpose(..., "step", "y", "x")
@@ -209,7 +210,9 @@ def uplift(
         states = [_opened(opening, flow, soft) for opening in gaps]
     leading = tuple(str(dim) for dim in gap.dims[:-2])
     pressure = np.reshape([low + drop * state.pressure for state in states], gap.shape)
-    knots = _diagrams(flow, (upstream_pressure, low), drain_share, _drain_place(gap, flow, drains))
+    axis = flow.sides[0].axis
+    drain_places = flow.sense * (_from_edge(gap, axis, points[:, 1 - axis]) - flow.sides[0].place)
+    knots = _diagrams(flow, (upstream_pressure, low), drain_share, drain_places)
     result = _forces(pressure, flow, knots, leading)
     for axis, name in enumerate(("uplift_y", "uplift_x")):
         result[name] = result[name] - _from_edge(gap, axis, 0.0)
@@ -257,8 +260,7 @@ def _sides(upstream: Any, downstream: Any, gap: xr.DataArray) -> tuple[Side, Sid
 def _side(value: Any, gap: xr.DataArray) -> Side:
     grid = read_grid(gap)
     if isinstance(value, str):
-        name, is_far = EDGES[value]
-        axis = "yx".index(name)
+        axis, is_far = EDGES[value]
         return Side(axis, grid.extent[axis] if is_far else 0.0, True)
     axis = "yx".index(value[0])
     spacing = grid.spacing[axis]
@@ -266,13 +268,11 @@ def _side(value: Any, gap: xr.DataArray) -> Side:
     return Side(axis, (cell + 0.5) * spacing, False)
 
 
-def _drain_cells(gap: xr.DataArray, grid: Grid, drains: Any, diameter: float) -> Array:
+def _drain_cells(gap: xr.DataArray, grid: Grid, points: Array, diameter: float) -> Array:
     """Return which cells are drains: those within the diameter of a point, at least the nearest one."""
     cells = np.zeros(grid.shape, dtype=bool)
-    if drains is None:
-        return cells
     y, x = (np.asarray(gap[dim].values, dtype=np.float64) for dim in ("y", "x"))
-    for point_x, point_y in np.asarray(drains, dtype=np.float64).reshape(-1, 2):
+    for point_x, point_y in points:
         cells[np.abs(y - point_y).argmin(), np.abs(x - point_x).argmin()] = True
         if diameter > 0:
             cells |= np.hypot(*np.meshgrid(y - point_y, x - point_x, indexing="ij")) <= diameter / 2.0
@@ -475,25 +475,17 @@ def _balanced(
 Knots = dict[str, tuple[Array, Array]]
 
 
-def _drain_place(gap: xr.DataArray, flow: HeldFlow, drains: Any) -> float:
-    """Return the mean distance (m) of the drains from the upstream side, NaN without any."""
-    if drains is None:
-        return math.nan
-    axis, place = flow.sides[0].axis, flow.sides[0].place
-    points = np.asarray(drains, dtype=np.float64).reshape(-1, 2)[:, 1 - axis]  # (x, y)
-    return flow.sense * float((_from_edge(gap, axis, points) - place).mean())
-
-
-def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float, drain: float) -> Knots:
+def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float, drains: Array) -> Knots:
     """Return distance from the upstream side and pressure at the knots of the diagrams of guidelines.
 
-    The bilinear one breaks at `drain` (m), where the drains are, not at the middle of their cells.
+    The bilinear one breaks at the mean distance of the `drains` (m), not at the middle of their cells.
     """
     (upstream, downstream), (high, low) = flow.sides, ends
     if upstream.axis != downstream.axis:
         return {}
     reach, last = abs(downstream.place - upstream.place), np.sort(flow.distances(both_ends=True))
     knots = {"linear": (np.array([last[0], 0.0, reach, last[1]]), np.array([high, high, low, low]))}
+    drain = float(drains.mean()) if drains.size else math.nan
     if 0.0 < drain < reach:
         pressure = np.array([high, high, low + share * (high - low), low, low])
         knots["bilinear"] = np.array([last[0], 0.0, drain, reach, last[1]]), pressure
