@@ -6,7 +6,6 @@ Below it, the moments of the mass in a gliding box, by blocks of positions, and 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -161,17 +160,7 @@ def _with_interval(
             shapes[:, 1] = 1
         elif planes.rank == 1:
             shapes[:, 0] = 1
-        replicates = np.array(
-            _masks.parallel_map(
-                lambda k: (
-                    box_sums(cells[k], planes.valid_of(k), shapes, planes.grid.periodic)
-                    .leaving_out()
-                    .lacunarity
-                ),
-                range(planes.count),
-                planes.plane_size * sizes.size,
-            )
-        )
+        replicates = box_moments(planes, shapes, cells)[1]
         with np.errstate(divide="ignore", invalid="ignore"):
             width = np.exp(half_width(np.log(replicates - 1.0)))
         excess = replicates[:, 0] - 1.0
@@ -266,9 +255,8 @@ def squares_from_pairs(pairs: Array, largest: int) -> Array:
     return total
 
 
-@dataclass(frozen=True)
-class BoxSums:
-    """Sums over the positions of each box, all of shape (boxes, blocks).
+def box_moments(planes: Planes, boxes: Array, masses: Array | None = None) -> tuple[Array, Array]:
+    """Return the share of positions that meet the set, and the lacunarity <M^2> / <M>^2, by box.
 
     A box of any height and width moves over the plane cell by cell. Of its mass M (the cells of the set in
     it, or the sum of a field) the number of positions with M > 0, the sum of M and the sum of M^2 are added
@@ -276,48 +264,38 @@ class BoxSums:
     such sums, so leaving out one block after the other gives their standard errors (Quenouille 1956; Kunsch
     1989 for blocks). On a free axis only positions inside the plane count, with gaps only those at which
     every cell was observed.
-    """
-
-    places: Array
-    hits: Array
-    masses: Array
-    squares: Array
-
-    def leaving_out(self) -> BoxMoments:
-        """Return the moments over all positions, then those without each of the blocks in turn."""
-        parts = (self.places, self.hits, self.masses, self.squares)
-        places, hits, masses, squares = (
-            np.concatenate([part.sum(1)[None], part.sum(1)[None] - part.T]) for part in parts
-        )
-        with np.errstate(divide="ignore", invalid="ignore"):
-            lacunarity = np.where(masses > 0, places * squares / masses**2, np.nan)
-            return BoxMoments(hits / places, lacunarity)
-
-
-@dataclass(frozen=True)
-class BoxMoments:
-    """Share of positions that meet the set, and lacunarity <M^2> / <M>^2, each (1 + blocks, boxes)."""
-
-    hit: Array
-    lacunarity: Array
-
-
-def box_sums(cells: Array, valid: Array | None, boxes: Array, periodic: Sequence[bool]) -> BoxSums:
-    """Return the sums of one plane for all boxes.
 
     Parameters
     ----------
-    cells : ndarray, shape (ny, nx)
-        uint8 of 0 and 1, or a field of float64, at least 0 and 0 where nothing was observed.
-    valid : ndarray of uint8, shape (ny, nx), or None
-        Observed cells; None: all of them.
+    planes : Planes
     boxes : ndarray of int64, shape (boxes, 2)
         Height and width of each in cells; NaN where one is longer than a free axis.
-    periodic : pair of bool
-        Whether the box wraps around in y and in x.
+    masses : ndarray of float64, shape (planes, ny, nx), optional
+        A field, at least 0 and 0 where nothing was observed; by default the cells of the set.
+
+    Returns
+    -------
+    hit, lacunarity : ndarray, shape (planes, 1 + blocks, boxes)
+        Over all positions, then without each of the blocks in turn.
     """
+    blocks = np.array(
+        planes.map(
+            lambda _, valid, mass: _box_sums(mass, valid, boxes, planes.grid.periodic),
+            planes.cells if masses is None else masses,
+            passes=len(boxes),
+        )
+    )
+    total = blocks.sum(-1)[..., None]
+    sums = np.concatenate([total, total - blocks], axis=-1).swapaxes(-1, -2)
+    places, hits, mass, squares = np.moveaxis(sums, 1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return hits / places, np.where(mass > 0, places * squares / mass**2, np.nan)
+
+
+def _box_sums(cells: Array, valid: Array | None, boxes: Array, periodic: Sequence[bool]) -> Array:
+    """Return positions, hits, masses and squared masses of one plane for all boxes, (4, boxes, blocks)."""
     (ny, nx), (wrap_y, wrap_x) = cells.shape, periodic
-    parts = np.zeros((4, len(boxes), BLOCKS if ny == 1 else BLOCKS * BLOCKS))
+    sums = np.zeros((4, len(boxes), BLOCKS if ny == 1 else BLOCKS * BLOCKS))
     observed = np.zeros((0, 0), np.uint8) if valid is None else valid
     for box, (height, width) in enumerate(boxes.tolist()):
         rows, across = ny if wrap_y else ny - height + 1, nx if wrap_x else nx - width + 1
@@ -325,25 +303,22 @@ def box_sums(cells: Array, valid: Array | None, boxes: Array, periodic: Sequence
             continue
         # masses are exact integers; their squares along a row too, unless the box is longer than 2^14 cells
         is_exact = cells.dtype == np.uint8 and (height * width) ** 2 * across <= LARGEST_INT64
-        dtype = np.int32 if is_exact and nx * height <= LARGEST_INT32 else np.float64
-        columns, seen = np.zeros(nx, dtype), np.zeros(nx if valid is not None else 0, np.int32)
-        prefix, seen_prefix = np.zeros(nx + width + 1, dtype), np.zeros(nx + width + 1, np.int32)
-        glide(cells, observed, height, width, rows, across, columns, seen, prefix, seen_prefix, parts[:, box])
-    return BoxSums(*parts)
+        columns = np.zeros(nx, np.int32 if is_exact and nx * height <= LARGEST_INT32 else np.float64)
+        glide(cells, observed, height, width, rows, across, columns, sums[:, box])
+    return sums
 
 
-def jackknife_error(replicates: Array) -> Array:
-    """Return the standard error from an estimate and its values without each block, on axis 1."""
+def half_width(replicates: Array) -> Array:
+    """Return the half-width of the 95 % interval of an estimate from its values without each block, axis 1.
+
+    Student's t, of as many degrees of freedom as there are blocks, less one.
+    """
     leave = replicates[:, 1:]
     n = leave.shape[1]
     with np.errstate(invalid="ignore"):  # logarithms of nothing
         deviations = leave - leave.mean(1, keepdims=True)
-    return np.asarray(np.sqrt((n - 1) / n * (deviations**2).sum(1)))
-
-
-def half_width(replicates: Array) -> Array:
-    """Return the half-width of the 95 % interval (Student's t; blocks less one degrees of freedom)."""
-    return np.asarray(student_quantile(replicates.shape[1] - 2) * jackknife_error(replicates))
+    error = np.sqrt((n - 1) / n * (deviations**2).sum(1))
+    return np.asarray(student_quantile(n - 1) * error)
 
 
 @inner_kernel
@@ -379,20 +354,18 @@ def glide(
     rows: int,
     across: int,
     columns: Array,
-    seen: Array,
-    prefix: Array,
-    seen_prefix: Array,
     sums: Array,
 ) -> None:
     """Add up positions, hits, masses and squared masses, `sums` (4, blocks), over rows x across positions.
 
-    `valid` is empty where everything was observed. The others are zeros to work in: `columns` (nx) and
-    `prefix` (nx + width + 1) of the type in which masses and squares are exact, int32 or float64; `seen` and
-    `seen_prefix` alike for observed cells, int32.
+    `valid` is empty where everything was observed. `columns` (nx) are zeros to work in, of the type in which
+    masses and squares are exact, int32 or float64.
     """
-    ny = cells.shape[0]
+    ny, nx = cells.shape
     blocks = BLOCKS
     has_gaps = valid.size > 0
+    seen = np.zeros(nx if has_gaps else 0, np.int32)
+    prefix, seen_prefix = np.zeros(nx + width + 1, columns.dtype), np.zeros(nx + width + 1, np.int32)
     area = height * width
     for i in range(1 - height, rows):
         entering = (i + height - 1) % ny

@@ -110,9 +110,13 @@ class Planes:
         values = np.asarray(values)
         return (*self.dims, *new_dims), values.reshape(self.shape + values.shape[1:])
 
-    def map(self, function: Callable[[Array, Array | None], R], *, passes: int = 1) -> list[R]:
-        """Apply a function that makes so many passes over a plane to cells and observed cells of each."""
-        planes = [(cells, self.valid_of(k)) for k, cells in enumerate(self.cells)]
+    def map(self, function: Callable[..., R], *columns: Iterable[Any], passes: int = 1) -> list[R]:
+        """Apply a function that makes so many passes over a plane to each.
+
+        Its arguments are cells, observed cells, and the entries of further columns.
+        """
+        valid = map(self.valid_of, range(self.count))
+        planes = zip(self.cells, valid, *columns, strict=True)
         return parallel_map(lambda plane: function(*plane), planes, self.plane_size * passes)
 
     def dataset(

@@ -22,7 +22,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
 from fractalcontact.domains._correlation import pair_correlation_length
-from fractalcontact.domains._lacunarity import BoxMoments, box_sums, half_width
+from fractalcontact.domains._lacunarity import box_moments, half_width
 from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = (
@@ -145,9 +145,9 @@ def analyse(
     shortest, extent = max(grid.spacing), min(grid.extent)
     steps = _curve_steps(shortest, extent, grid)
     sides = _sides(steps, grid)
-    moments = _moments(planes, np.concatenate([SMALLEST, steps + 1]))
-    spots = RandomSpots.of_hits(moments.hit[..., : len(SMALLEST)])
-    hit = moments.hit[..., len(SMALLEST) :]
+    hit, _ = box_moments(planes, np.concatenate([SMALLEST, steps + 1]))
+    spots = RandomSpots.of_hits(hit[..., : len(SMALLEST)])
+    hit = hit[..., len(SMALLEST) :]
     spot, gap = spots.size(grid), _gap(sides, hit)
 
     islands = np.array([plane.count for plane in components], np.int64)
@@ -164,9 +164,7 @@ def analyse(
         planes, gap[:, 0], islands, median, np.fmax(low, start), has_window=bool(np.isfinite(low))
     )
     in_window = _window_quantities(planes, spots, np.array([low, high]), scales)
-    pairs = _masks.parallel_map(
-        lambda plane: pair_correlation_length(planes, plane), range(planes.count), planes.plane_size
-    )
+    pairs = planes.map(lambda *plane: pair_correlation_length(planes, plane[-1]), range(planes.count))
     quantities = {"spot_size": spot, "gap_size": gap, "pair_correlation_length": np.array(pairs)}
     quantities |= in_window.replicates
     _withhold(quantities, in_window, flags)
@@ -292,14 +290,13 @@ def _window_quantities(
     rows, columns = squares.copy(), squares.copy()
     rows[:, 0], columns[:, 1] = 1, 1
     parts = [hits.boxes, squares, rows, columns]
-    moments = _moments(planes, np.concatenate(parts))
+    hit, lacunarity = box_moments(planes, np.concatenate(parts))
     ends = np.cumsum([len(part) for part in parts])[:-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        missed = np.maximum(1.0 - np.split(moments.hit, ends, axis=-1)[0], np.finfo(float).eps)
+        missed = np.maximum(1.0 - np.split(hit, ends, axis=-1)[0], np.finfo(float).eps)
         hit = -np.expm1(-np.exp(hits.between(np.log(-np.log(missed)))))
         excess = [
-            np.exp(masses.between(np.log(part)))
-            for part in np.split(moments.lacunarity - 1.0, ends, axis=-1)[1:]
+            np.exp(masses.between(np.log(part))) for part in np.split(lacunarity - 1.0, ends, axis=-1)[1:]
         ]
         null = spots.hit(np.append(fitted, scales)[:, None] / np.array(grid.spacing))
         dimension, of_null = (_dimension(fitted, each[..., :sizes]) for each in (hit, null))
@@ -368,17 +365,6 @@ def _curve_steps(
 def _sides(steps: Array, grid: Grid) -> Array:
     """Return the sides (m) of squares with the area of so many cells along y and x."""
     return np.asarray(np.sqrt(steps.prod(-1) * grid.cell_area))
-
-
-def _moments(planes: Planes, boxes: Array) -> BoxMoments:
-    """Return the moments of all planes, each (planes, 1 + blocks, boxes)."""
-    results = planes.map(
-        lambda cells, valid: box_sums(cells, valid, boxes, planes.grid.periodic).leaving_out(),
-        passes=len(boxes),
-    )
-    return BoxMoments(
-        np.array([each.hit for each in results]), np.array([each.lacunarity for each in results])
-    )
 
 
 def _dimension(lengths: Array, hit: Array) -> Array:
