@@ -28,13 +28,7 @@ SHAPE_COLUMNS = ("orientation", "eccentricity", "gyration_radius", "solidity")
 COLUMNS = (*PLAIN_COLUMNS, "perimeter", "centroid_x", "centroid_y", "x_min", "x_max", "y_min", "y_max")
 
 
-@dataclass(frozen=True)
-class PartMeasures:
-    """Sums over every part (see `measure_parts`); the part k is at index k - 1."""
-
-    sums: Array
-    sides: Array
-    box: Array
+NOTHING = np.array([0, 0, 0, 0, 0, INT64_MAX, -INT64_MAX, INT64_MAX, -INT64_MAX])  # in `measure_parts`
 
 
 @dataclass(frozen=True)
@@ -45,7 +39,8 @@ class Components:
     belongs to the island that begins with the part `root[k]`, and is displaced by `shift[k]` periods (y, x)
     from where it continues the rest of it; every other part begins an island of its own. The island that
     begins with the part `wrapping[k]` wraps around the period along the axes (y, x) where `wraps[k]` is True.
-    `cells` counts those of every part, and `details` holds its other measures where they were requested.
+    `cells` counts those of every part, and `details` (parts, 9) has its other measures where they were
+    requested (see `measure_parts`).
     `ends` are the parts at the first and last row and column; `parts` is the map of parts, (ny, nx) int32, or
     None where it was not kept.
     """
@@ -56,7 +51,7 @@ class Components:
     wrapping: Array
     wraps: Array
     cells: Array
-    details: PartMeasures | None
+    details: Array | None
     ends: tuple[Array, Array, Array, Array]
     parts: Array | None
 
@@ -146,15 +141,15 @@ def label_plane(
     measures = detailed is not False
     count, links, counts, columns = 0, [], [], []
     rows: list[Array] = []
-    details: list[tuple[Array, ...]] = []
+    details: list[Array] = []
     for start in range(0, ny, height):
         parts, number = ndimage.label(cells[start : start + height], neighbours)
         counts.append(_part_sizes(parts, number).astype(count_dtype))
         measures &= detailed is not None or count + number <= MANY_ISLANDS
         if measures:
-            arrays = _empty_measures(number + 1)
-            measure_parts(parts, cells, start, wrap_y, wrap_x, *arrays)
-            details.append(tuple(values[1:] for values in arrays))
+            of_parts = np.tile(NOTHING, (number + 1, 1))
+            measure_parts(parts, cells, start, wrap_y, wrap_x, of_parts)
+            details.append(of_parts[1:])
         else:
             details.clear()
         if count:
@@ -168,9 +163,7 @@ def label_plane(
     links += [_links(rows[-1], rows[0], step, wrap_x, down=1) for step in steps if wrap_y]
     links += [_links(right, left, step, wrap_y, down=1)[:, [0, 1, 3, 2]] for step in steps if wrap_x]
     joined = _join(np.concatenate([np.empty((0, 4), np.int64), *links]))
-    measured = (
-        PartMeasures(*(np.concatenate(each) for each in zip(*details, strict=True))) if measures else None
-    )
+    measured = np.concatenate(details) if measures else None
     return Components(*joined, np.concatenate(counts), measured, ends, parts if keep else None)
 
 
@@ -194,11 +187,6 @@ def _join(links: Array) -> tuple[Array, Array, Array, Array, Array]:
     is_root = parent == np.arange(linked.size)
     wrapping = is_root & wraps.any(1)
     return linked[~is_root], linked[parent[~is_root]], shift[~is_root], linked[wrapping], wraps[wrapping]
-
-
-def _empty_measures(parts: int) -> tuple[Array, Array, Array]:
-    box = np.tile(np.array([INT64_MAX, -INT64_MAX, INT64_MAX, -INT64_MAX]), (parts, 1))
-    return np.zeros((parts, 3), np.int64), np.zeros((parts, 2), np.int64), box
 
 
 def _links(edge: Array, facing: Array, step: int, wraps: bool, *, down: int) -> Array:
@@ -232,36 +220,21 @@ def component_table(
         table |= _shapes(components, grid, with_hull="solidity" in shape)
     if components.details is None:
         return {name: table[name] for name in columns}
+    cells, rows, across, sides_y, sides_x, *ends = components.details.T
     dy, dx = grid.spacing
-    sides = components.details.sides
-    table["perimeter"] = components.reduce(sides[:, 0]) * dx + components.reduce(sides[:, 1]) * dy
-    for axis, name in enumerate(("y", "x")):
-        table |= _positions(components, components.details, size, grid, origin, axis, name)
+    table["perimeter"] = components.reduce(sides_y) * dx + components.reduce(sides_x) * dy
+    for axis, (name, total) in enumerate({"y": rows, "x": across}.items()):
+        n, spacing, wraps = grid.shape[axis], grid.spacing[axis], components.wraps_by_island[:, axis]
+        first = origin[axis] - 0.5 * spacing
+        shift = components.part_shift(axis) * n
+        low = components.reduce(ends[2 * axis] + shift, np.minimum)
+        high = components.reduce(ends[2 * axis + 1] + shift + 1, np.maximum)
+        turn = low // n * n  # back to where the first cell lies inside the extent
+        centre = components.reduce(total + cells * shift) / size + 0.5
+        table[f"centroid_{name}"] = np.where(wraps, np.nan, first + centre % n * spacing)
+        table[f"{name}_min"] = first + np.where(wraps, 0, low - turn) * spacing
+        table[f"{name}_max"] = first + np.where(wraps, n, high - turn) * spacing
     return {name: table[name] for name in columns}
-
-
-def _positions(
-    components: Components,
-    details: PartMeasures,
-    size: Array,
-    grid: Grid,
-    origin: Sequence[float],
-    axis: int,
-    name: str,
-) -> dict[str, Array]:
-    """Return centroid and bounding box of every island along an axis."""
-    n, spacing, wraps = grid.shape[axis], grid.spacing[axis], components.wraps_by_island[:, axis]
-    first = origin[axis] - 0.5 * spacing
-    shift = components.part_shift(axis) * n
-    low = components.reduce(details.box[:, 2 * axis] + shift, np.minimum)
-    high = components.reduce(details.box[:, 2 * axis + 1] + shift + 1, np.maximum)
-    turn = low // n * n  # back to where the first cell lies inside the extent
-    centre = components.reduce(details.sums[:, axis + 1] + details.sums[:, 0] * shift) / size + 0.5
-    return {
-        f"centroid_{name}": np.where(wraps, np.nan, first + centre % n * spacing),
-        f"{name}_min": first + np.where(wraps, 0, low - turn) * spacing,
-        f"{name}_max": first + np.where(wraps, n, high - turn) * spacing,
-    }
 
 
 def _shapes(components: Components, grid: Grid, *, with_hull: bool) -> dict[str, Array]:
@@ -393,32 +366,29 @@ def union_find(links: Array, parent: Array, shift: Array, wraps: Array) -> None:
 
 @kernel
 def measure_parts(
-    parts: Array, cells: Array, start: int, wrap_y: bool, wrap_x: bool, sums: Array, sides: Array, box: Array
+    parts: Array, cells: Array, start: int, wrap_y: bool, wrap_x: bool, measures: Array
 ) -> None:
-    """Add up the parts of a band of rows that begins at row `start` of the plane.
+    """Measure the parts of a band of rows that begins at row `start` of the plane.
 
-    `sums` (parts, 3) gets cells, rows and columns; `sides` (parts, 2) the sides across y and across x that
-    face open cells; `box` (parts, 4) the first and last row and column, and holds wide limits before.
+    `measures` (parts, 9), at first `NOTHING`, gets the sums of the cells, of their rows and of their columns,
+    the sides across y and across x that face open cells, the first and last row, and the first and last
+    column.
     """
     ny, nx = cells.shape
     for k in range(parts.shape[0]):
         i = start + k
         for j in range(nx):
-            part = parts[k, j]
-            if part == 0:
+            if parts[k, j] == 0:
                 continue
-            sums[part, 0] += 1
-            sums[part, 1] += i
-            sums[part, 2] += j
-            box[part, 0] = min(box[part, 0], i)
-            box[part, 1] = max(box[part, 1], i)
-            box[part, 2] = min(box[part, 2], j)
-            box[part, 3] = max(box[part, 3], j)
-            if (i > 0 or wrap_y) and cells[i - 1, j] == 0:
-                sides[part, 0] += 1
-            if (i < ny - 1 or wrap_y) and cells[(i + 1) % ny, j] == 0:
-                sides[part, 0] += 1
-            if (j > 0 or wrap_x) and cells[i, j - 1] == 0:
-                sides[part, 1] += 1
-            if (j < nx - 1 or wrap_x) and cells[i, (j + 1) % nx] == 0:
-                sides[part, 1] += 1
+            part = measures[parts[k, j]]
+            part[0] += 1
+            part[1] += i
+            part[2] += j
+            part[3] += (i > 0 or wrap_y) and cells[i - 1, j] == 0
+            part[3] += (i < ny - 1 or wrap_y) and cells[(i + 1) % ny, j] == 0
+            part[4] += (j > 0 or wrap_x) and cells[i, j - 1] == 0
+            part[4] += (j < nx - 1 or wrap_x) and cells[i, (j + 1) % nx] == 0
+            part[5] = min(part[5], i)
+            part[6] = max(part[6], i)
+            part[7] = min(part[7], j)
+            part[8] = max(part[8], j)
