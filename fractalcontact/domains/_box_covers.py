@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fractalcontact.base.jit import kernel
+from fractalcontact.domains._aligned_boxes import joined_boxes
 from fractalcontact.domains._masks import Array, Planes, parallel_map
 
 COVERS = ("minimum", "mean", "aligned")
@@ -231,35 +232,11 @@ def _aligned_cover(planes: Planes, sizes: Array) -> Curve:
     """Boxes of the one grid that starts at the first cell."""
 
     def counts(cells: Array) -> list[int]:
-        levels = {1: cells}
-        for size in map(int, sizes):
-            coarsest = max(other for other in levels if size % other == 0)
-            levels[size] = (
-                levels[coarsest] if coarsest == size else _coarsen(levels[coarsest], size // coarsest)
-            )
-        return [int(np.count_nonzero(levels[int(size)].view(np.bool_))) for size in sizes]
+        levels = joined_boxes(cells, sizes, np.bitwise_or)
+        return [int(np.count_nonzero(level.view(np.bool_))) for level in levels]
 
-    values = np.array(parallel_map(counts, planes.cells, planes.plane_size), np.int64).reshape(
-        planes.count, sizes.size
-    )
+    values = np.array(planes.map(lambda cells, _: counts(cells)), np.int64).reshape(-1, sizes.size)
     return Curve(sizes, values, values * sizes.astype(float) ** 2)
-
-
-def _coarsen(cells: Array, factor: int) -> Array:
-    """Mark the boxes of `factor` cells, on the grid from the first cell, that hold a cell of the set."""
-    ny, nx = cells.shape
-    if factor == 2 and nx % 2 == 0:
-        coarse = np.empty((-(-ny // 2), nx // 2), np.uint8)
-        halve(cells.view(np.uint16), coarse)
-        return coarse
-    for axis in (0, 1):
-        lines = np.moveaxis(cells, axis, 0)
-        coarse = np.copy(lines[::factor])  # a reduction by `reduceat` takes 13 to 25 times as long
-        for following in range(1, factor):
-            part = lines[following::factor]
-            coarse[: len(part)] |= part
-        cells = np.moveaxis(coarse, 0, axis)
-    return cells
 
 
 @kernel
@@ -357,15 +334,3 @@ def nearest_ahead(cells: Array, rows: int, columns: int, distance: Array, histog
         if i < rows:
             for j in range(columns):
                 histogram[distance[j] if distance[j] < far else far] += 1
-
-
-@kernel
-def halve(pairs: Array, coarse: Array) -> None:
-    """Halve the resolution: join two rows and, with two cells in each 16-bit word, two columns."""
-    ny = pairs.shape[0]
-    for i in range(coarse.shape[0]):
-        upper, lower = pairs[2 * i], pairs[min(2 * i + 1, ny - 1)]
-        out = coarse[i]
-        for j in range(pairs.shape[1]):
-            both = upper[j] | lower[j]
-            out[j] = np.uint8((both | (both >> np.uint16(8))) & np.uint16(1))

@@ -15,13 +15,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import DECADES, EXCESS_PER_EDGE, contact_edges
-from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import ROUNDED, float_array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import Quantity
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.domains import _masks
+from fractalcontact.domains._aligned_boxes import coarsened
 from fractalcontact.domains._masks import Array, Planes
 from fractalcontact.domains._scaling_fit import ROUNDING, fit_line, interval_notes
 
@@ -165,42 +165,17 @@ def _contents(
     if levels == 0:
         return [float(np.count_nonzero(cells))] * exponents.size
     # a free plane is moved away from the first square, a periodic one is rolled
-    along_y, along_x = (
-        (np.arange(n) + shift) % n if wraps else np.arange(n) + shift % 2**levels
-        for n, shift, wraps in zip(cells.shape, offset.tolist(), periodic, strict=True)
-    )
-    counts = np.zeros((along_y.max() // 2 + 1, along_x.max() // 2 + 1))
-    count_quarters(cells, along_y // 2, along_x // 2, counts)
+    for axis, (shift, wraps) in enumerate(zip(offset.tolist(), periodic, strict=True)):
+        before = [(shift if axis == own else 0, 0) for own in (0, 1)]
+        cells = np.roll(cells, shift, axis) if wraps else np.pad(cells, before)
+    counts = coarsened(cells, 2, np.add)
     contents = []
     for s in exponents.tolist():
         cost = np.minimum(counts, np.where(counts > 0, 2.0**s, 0.0))
         for level in range(2, levels + 1):
-            coarse = np.zeros(((cost.shape[0] + 1) // 2, (cost.shape[1] + 1) // 2))
-            join_quarters(cost, 2.0 ** (level * s), coarse)
-            cost = coarse
+            cost = np.minimum(coarsened(cost, 2, np.add), 2.0 ** (level * s))
         contents.append(float(cost.sum()))
     return contents
-
-
-@kernel
-def count_quarters(cells: Array, rows: Array, columns: Array, counts: Array) -> None:
-    """Count the cells of the set in every square of 2 x 2; cell (i, j) lies in (rows[i], columns[j])."""
-    for i in range(cells.shape[0]):
-        row = counts[rows[i]]
-        for j in range(cells.shape[1]):
-            if cells[i, j]:
-                row[columns[j]] += 1.0
-
-
-@kernel
-def join_quarters(cost: Array, price: float, coarse: Array) -> None:
-    """Cover each square of 2 x 2 at the cost of its quarters, or at its own price if that is less."""
-    for i in range(cost.shape[0]):
-        for j in range(cost.shape[1]):
-            coarse[i // 2, j // 2] += cost[i, j]
-    for i in range(coarse.shape[0]):
-        for j in range(coarse.shape[1]):
-            coarse[i, j] = min(coarse[i, j], price)
 
 
 AREA_SOURCE = (

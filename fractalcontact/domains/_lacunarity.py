@@ -18,6 +18,7 @@ from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import ARRAYS, public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks
+from fractalcontact.domains._aligned_boxes import joined_boxes
 from fractalcontact.domains._masks import Array, Planes
 
 SOURCE = (
@@ -187,23 +188,17 @@ def _lacunarity_from_pairs(cells: Array, sizes: Array) -> Array:
 def _fixed_lacunarity(planes: Planes, cells: Array, sizes: Array) -> Array:
     """Return <M^2> / <M>^2 over the fully observed boxes inside, of the grid from the first cell."""
 
-    def at_size(plane: int, size: int) -> float:
-        height = size if planes.rank == 2 else 1
-        mass, valid = _mass_of_boxes(cells[plane], height, size), planes.valid_of(plane)
-        if valid is not None:
-            mass = mass[_mass_of_boxes(valid, height, size) == height * size]
-        total = float(mass.sum())
-        return float(mass.size * (mass**2).sum()) / total**2 if total > 0 else float("nan")
+    def lacunarity(valid: Array | None, plane: Array) -> list[float]:
+        observed = np.ones(plane.shape) if valid is None else valid.astype(float)
+        areas, sums = (joined_boxes(each, sizes, np.add) for each in (observed, plane.astype(float)))
+        boxes = zip(sizes, areas, sums, strict=True)
+        masses = [mass[area == size**planes.rank] for size, area, mass in boxes]
+        return [
+            float(mass.size * (mass**2).sum() / total**2) if (total := mass.sum()) > 0 else np.nan
+            for mass in masses
+        ]
 
-    values = [at_size(plane, size) for plane in range(planes.count) for size in sizes.tolist()]
-    return np.array(values).reshape(planes.count, sizes.size)
-
-
-def _mass_of_boxes(cells: Array, height: int, width: int) -> Array:
-    """Sum over the boxes that lie inside the plane, float64."""
-    rows, columns = cells.shape[0] // height, cells.shape[1] // width
-    inside = cells[: rows * height, : columns * width].reshape(rows, height, columns, width)
-    return np.asarray(inside.sum((1, 3), dtype=np.float64))
+    return np.array(planes.map(lambda _, valid, plane: lacunarity(valid, plane), cells))
 
 
 def _notes(planes: Planes, values: Array, boxes: str) -> dict[str, dict[str, str]]:

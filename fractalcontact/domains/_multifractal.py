@@ -11,6 +11,7 @@ from fractalcontact.base.numbers import float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import _masks, _scaling_fit
+from fractalcontact.domains._aligned_boxes import joined_boxes
 from fractalcontact.domains._masks import Array
 
 SOURCE = (
@@ -109,17 +110,14 @@ def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Arra
     total = float(np.max(measure))
     if total == 0.0 or sizes.size < 2:
         return np.full((5, orders.size), np.nan)
-    levels = {1: measure / total}
-    observed = {1: np.ones(1) if valid is None else valid.astype(float)}
+    masses = joined_boxes(measure / total, sizes, np.add)
+    areas = joined_boxes(np.ones(measure.shape), sizes, np.add)
+    observed = areas if valid is None else joined_boxes(valid.astype(float), sizes, np.add)
     log_partition, mean_log_mu = np.empty((2, orders.size, sizes.size))
-    for place, size in enumerate(sizes.tolist()):
-        coarsest = max(other for other in levels if size % other == 0)
-        levels[size] = _sum_boxes(levels[coarsest], size // coarsest)
-        occupied = levels[size] > 0
-        share, weight = levels[size][occupied], np.ones(1)
-        if valid is not None:
-            observed[size] = _sum_boxes(observed[coarsest], size // coarsest)
-            weight = (observed[size] / _sum_boxes(np.ones(measure.shape), size))[occupied]
+    for place, mass in enumerate(masses):
+        occupied = mass > 0
+        weight = np.ones(1) if valid is None else (next(observed) / next(areas))[occupied]
+        share = mass[occupied]
         log_mu = np.log(share / share.sum() / weight)
         log_partition[:, place], mean_log_mu[:, place] = _moments(log_mu, weight, orders)
     tau, tau_spread = _scaling_fit.fit_line(np.log(sizes), log_partition)
@@ -129,15 +127,6 @@ def _fit_moments(measure: Array, valid: Array | None, orders: Array, sizes: Arra
     dimension = np.where(is_one, alpha, tau / q_less_1)
     half_width = _scaling_fit.ROUNDING + 2.0 * np.where(is_one, alpha_spread, tau_spread / np.abs(q_less_1))
     return np.stack([dimension, half_width, tau, alpha, orders * alpha - tau])
-
-
-def _sum_boxes(plane: Array, factor: int) -> Array:
-    """Sum over boxes of `factor` cells, on the grid from the first cell."""
-    if factor == 1:
-        return plane
-    ny, nx = plane.shape
-    rows = np.add.reduceat(plane, np.arange(0, ny, factor), axis=0)
-    return np.asarray(np.add.reduceat(rows, np.arange(0, nx, factor), axis=1))
 
 
 def _moments(log_mu: Array, weight: Array, orders: Array) -> tuple[Array, Array]:
