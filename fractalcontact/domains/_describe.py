@@ -10,7 +10,6 @@ import xarray as xr
 
 from fractalcontact.base.grid import contact_edges
 from fractalcontact.base.results import REASONS, public_result
-from fractalcontact.base.schema import NOTES
 from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.domains import (
@@ -40,9 +39,6 @@ DESCRIBED_OF_PROFILES = ("islands", "box_dimension", "correlation_dimension")
 NOT_COLLECTED = ("scale_min", "scale_max", "run_time", "integral_range")
 CURVES = ("box_size", "radius", "side")  # the dims of curves, which `describe` leaves out
 OTHER_SIZES = "NaN at sizes of boxes that only the other measures have"
-
-
-Variable = tuple[tuple[str, ...], Array]
 
 
 def sources(measures: Sequence[str]) -> str:
@@ -103,85 +99,57 @@ def describe(
     planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity, keep=False)
     wanted = DESCRIBED if planes.rank == 2 else DESCRIBED_OF_PROFILES
-    measurements = measure_planes(planes, wanted, components, connectivity)
+    result = measure_planes(planes, wanted, components, connectivity)
     if planes.rank == 2:
-        measurements.add_dataset(_signature.analyse(planes, components))
-    variables = {
-        name: variable
-        for name, variable in measurements.variables.items()
-        if not set(variable[0]) & set(CURVES)
-    }
-    coords = {name: values for name, values in measurements.coords.items() if name in ("axis", "scale")}
-    notes = {name: note for name, note in measurements.notes.items() if name in variables}
-    return planes.dataset(variables, coords, notes=notes)
-
-
-class Measurements:
-    """Variables, coordinates and notes of several analyses of the same planes."""
-
-    def __init__(self, planes: Planes) -> None:
-        self.planes = planes
-        self.variables: dict[str, Variable] = {"coverage": planes.variable(planes.coverage)}
-        self.coords: dict[str, Any] = {}
-        self.notes: dict[str, dict[str, str]] = {}
-
-    def add_dataset(self, dataset: xr.Dataset) -> None:
-        """Add the variables of a result that has names of its own."""
-        for name, variable in dataset.variables.items():
-            if name in dataset.coords and name not in self.planes.coords:
-                self.coords[str(name)] = variable
-            elif name not in dataset.coords and name != "run_time":
-                self.variables[str(name)] = tuple(map(str, variable.dims)), variable.values
-                notes = {key: variable.attrs[key] for key in NOTES if key in variable.attrs}
-                if notes:
-                    self.notes[str(name)] = notes
+        result.update(_signature.analyse(planes, components))
+    return result.drop_dims([dim for dim in CURVES if dim in result.dims])
 
 
 def measure_planes(
     planes: Planes, wanted: Sequence[str], components: Sequence[Components], connectivity: int
-) -> Measurements:
+) -> xr.Dataset:
     """Measure what is wanted out of `MEASURES`; `components` are needed for islands and percolation."""
-    result = Measurements(planes)
+    values: dict[str, Array] = {"coverage": planes.coverage}
     if "islands" in wanted:
-        values = _islands.island_scalars(components, planes, connectivity)
         if planes.rank == 2:
             sides = np.array(planes.grid.spacing[::-1])
-            perimeter = contact_edges(planes.cells, planes.grid.periodic) @ sides
-            values = {"total_perimeter": perimeter, **values}
-        result.variables.update({name: planes.variable(array) for name, array in values.items()})
+            values["total_perimeter"] = contact_edges(planes.cells, planes.grid.periodic) @ sides
+        values |= _islands.island_scalars(components, planes, connectivity)
+    results = [planes.dataset({name: planes.variable(array) for name, array in values.items()})]
     if "percolation" in wanted:
-        result.add_dataset(_islands.crossings(components, planes, connectivity))
-    datasets = {name: module.analyse(planes) for name, module in ANALYSES.items() if name in wanted}
-    box_sizes = [dataset["box_size"].values for dataset in datasets.values() if "box_size" in dataset.coords]
-    all_sizes = np.unique(np.concatenate([np.empty(0, np.int64), *box_sizes]))
-    if all_sizes.size:
-        result.coords |= planes.box_coords(all_sizes)
-    for name, dataset in datasets.items():
-        _add_analysis(result, name, dataset, all_sizes)
+        results.append(_islands.crossings(components, planes, connectivity))
+    analyses = [_renamed(name, module.analyse(planes)) for name, module in ANALYSES.items() if name in wanted]
+    sizes = [each["box_size"].values for each in analyses if "box_size" in each.coords]
+    if sizes:  # those of every analysis come first, as their lengths would have gaps
+        results.append(planes.dataset({}, planes.box_coords(np.unique(np.concatenate(sizes)))))
+    result = xr.merge([*results, *analyses], join="outer", compat="override", combine_attrs="override")
+    for name, variable in ((name, each.variables[name]) for each in analyses for name in each.data_vars):
+        if variable.sizes.get("box_size", np.inf) < result.sizes.get("box_size", 0):
+            own = f"; {REASONS[name]}" if name in REASONS and np.isnan(variable.values).any() else ""
+            result.variables[name].attrs["reason"] = OTHER_SIZES + own
     return result
 
 
-def _add_analysis(result: Measurements, name: str, dataset: xr.Dataset, all_sizes: Array) -> None:
-    """Add the variables of one analysis, under names that are unique among all of them."""
-    for key, variable in dataset.variables.items():
-        if key in dataset.coords or key in NOT_COLLECTED:
-            continue
-        new, dims, values = _unique_name(name, str(key)), tuple(map(str, variable.dims)), variable.values
-        if "comment" in variable.attrs:
-            result.notes[new] = {"comment": variable.attrs["comment"]}
-        if "box_size" in dims and values.shape[-1] < all_sizes.size:
-            own = f"; {REASONS[new]}" if new in REASONS and np.isnan(values).any() else ""
-            result.notes.setdefault(new, {})["reason"] = OTHER_SIZES + own
-            values = _on_sizes(all_sizes, dataset["box_size"].values, values)
-        result.variables[new] = dims, values
-    if "radius" in dataset.coords:
-        result.coords["radius"] = ("radius", dataset["radius"].values)
-        result.coords["radius_length"] = ("radius", dataset["radius_length"].values)
-    if "scale_min" in dataset and np.isfinite(dataset["scale_min"]).any():
-        low, high = float(dataset["scale_min"].max()), float(dataset["scale_max"].max())
-        note = result.notes.setdefault(name, {})
+def _renamed(analysis: str, dataset: xr.Dataset) -> xr.Dataset:
+    """Return the result of an analysis under names that are unique among all of them.
+
+    Of the attributes of its variables it keeps the comments, and units where these are not the usual ones.
+    """
+    names = {
+        name: _unique_name(analysis, str(name)) for name in dataset.data_vars if name not in NOT_COLLECTED
+    }
+    result = dataset[list(names)].rename(names)
+    for name in result.data_vars:
+        attributes = result.variables[name].attrs
+        kept = {key: attributes[key] for key in ("comment", "units") if key in attributes}
+        result.variables[name].attrs = kept
+    scales = [dataset.variables[end].values for end in ("scale_min", "scale_max") if end in dataset]
+    if np.isfinite(scales).any():
+        low, high = np.nanmax(scales, axis=tuple(range(1, np.ndim(scales))))
+        note = result.variables[analysis].attrs
         reason = f"{note['comment']}; " if "comment" in note else ""
         note["comment"] = f"{reason}fitted over {low:.3g} to {high:.3g} cells"
+    return result
 
 
 def _unique_name(analysis: str, name: str) -> str:
@@ -192,10 +160,3 @@ def _unique_name(analysis: str, name: str) -> str:
     if name == "local_slope" or (name == "null_dimension" and prefix != "box"):
         return f"{prefix}_{name}"
     return name
-
-
-def _on_sizes(all_sizes: Array, sizes: Array, values: Array) -> Array:
-    """Spread a curve over all sizes; NaN where it was not measured."""
-    result = np.full((*values.shape[:-1], all_sizes.size), np.nan)
-    result[..., np.searchsorted(all_sizes, sizes)] = values
-    return result

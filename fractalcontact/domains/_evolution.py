@@ -22,7 +22,7 @@ from fractalcontact.base.study import joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains import _masks, _signature
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._describe import MEASURES, Measurements, measure_planes, sources
+from fractalcontact.domains._describe import MEASURES, measure_planes, sources
 from fractalcontact.domains._masks import Array, Planes, check_window, read_planes
 
 SOURCE = joined_references(_signature.SOURCE, "Hausdorff, Mengenlehre (1927)")
@@ -122,37 +122,36 @@ def evolution(
     planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity)
     path = Path.of(planes, along, frame)
-    measurements = measure_planes(planes, wanted, components, connectivity)
+    result = measure_planes(planes, wanted, components, connectivity)
     if signature is None:
         signature = _signature.analyse(planes, components, window=window, along=along)
-    measurements.add_dataset(signature)
-    _add_changes(measurements, components, path)
-    _add_returns(measurements, path)
-    result = planes.dataset(measurements.variables, measurements.coords, notes=measurements.notes)
+    result.update(signature.drop_vars("run_time", errors="ignore"))
+    result.update(_changes(planes, components, path, signature["spot_size"].values.reshape(-1)))
+    result.update(_returns(planes, path))
     return result.assign_attrs(references=joined_references(SOURCE, *([sources(wanted)] if wanted else [])))
 
 
-def _add_changes(measurements: Measurements, components: Sequence[Components], path: Path) -> None:
-    """Add how every state differs from the one before it along the path."""
-    planes = measurements.planes
+def _changes(planes: Planes, components: Sequence[Components], path: Path, spots: Array) -> xr.Dataset:
+    """Return how every state differs from the one before it along the path; `spots` are their sizes."""
     rows = np.full((planes.count, len(CHANGES)), np.nan)
     for k in np.flatnonzero(path.before >= 0):
         rows[k] = _change(planes, components, path, int(k))
-    spot = measurements.variables["spot_size"][1].reshape(-1)
     with np.errstate(invalid="ignore"):
-        too_far = path.travel > np.fmax(spot, spot[path.before])
+        too_far = path.travel > np.fmax(spots, spots[path.before])
     rows[too_far, : len(EVENTS)] = np.nan
-    comment = f"NaN at the first state along {path.dim}, which has none before it"
-    measurements.variables.update({name: planes.variable(rows[:, k]) for k, name in enumerate(CHANGES)})
-    measurements.notes.update({name: {"comment": comment} for name in CHANGES})
-    if too_far.any():
-        reason = f"{comment}, and where the block travels further than a spot"
-        measurements.notes.update({name: {"comment": reason} for name in EVENTS})
+    comments = dict.fromkeys(CHANGES, f"NaN at the first state along {path.dim}, which has none before it")
+    reasons = dict.fromkeys(EVENTS, "the block travels further than a spot") if too_far.any() else {}
     if np.isnan(rows[path.before >= 0, len(EVENTS) :]).any():
-        reasons = dict.fromkeys(CHANGES[len(EVENTS) : -1], "both sets are empty")
+        reasons |= dict.fromkeys(CHANGES[len(EVENTS) : -1], "both sets are empty")
         reasons["hausdorff_distance"] = "a set is empty"
-        for name, reason in reasons.items():
-            measurements.notes[name] = {"comment": f"{comment}, and where {reason}"}
+    comments |= {name: f"{comments[name]}, and where {reason}" for name, reason in reasons.items()}
+    return _labelled_rows(planes, rows, comments)
+
+
+def _labelled_rows(planes: Planes, rows: Array, comments: dict[str, str]) -> xr.Dataset:
+    """Return a row of numbers for each plane, (planes, names), with the comment of each name."""
+    variables = {name: planes.variable(values) for name, values in zip(comments, rows.T, strict=True)}
+    return planes.dataset(variables, notes={name: {"comment": text} for name, text in comments.items()})
 
 
 def _change(planes: Planes, components: Sequence[Components], path: Path, k: int) -> list[float]:
@@ -171,32 +170,21 @@ def _chance_overlap(first: float, second: float) -> float:
     return float(first * second / united) if united > 0 else float("nan")
 
 
-def _add_returns(measurements: Measurements, path: Path) -> None:
-    """Add how every plane differs from that at the same load on the opposite branch before, if any."""
-    planes = measurements.planes
-    coords = planes.coords
-    load = next((name for name in LOADS if name in coords and path.dim in coords[name].dims), None)
-    if load is None:
-        return
-    rows = _returns(planes, coords[load], path)
-    measurements.variables.update({name: planes.variable(rows[:, k]) for k, name in enumerate(RETURN_NAMES)})
-    reason = f"NaN where the path has not come back to the same {load}, or both sets are empty"
-    measurements.notes.update({name: {"comment": reason} for name in RETURN_NAMES})
-
-
-def _returns(planes: Planes, load: xr.Variable, path: Path) -> Array:
-    """Compare each plane with that at the same load on the opposite branch before, (planes, 3)."""
-    shape = [planes.shape[k] if dim in load.dims else 1 for k, dim in enumerate(planes.dims)]
-    values = load.transpose(*(dim for dim in planes.dims if dim in load.dims)).values.reshape(shape)
-    loads = np.broadcast_to(values, planes.shape).reshape(-1)
+def _returns(planes: Planes, path: Path) -> xr.Dataset:
+    """Compare every plane with that at the same load on the opposite branch before, if there are loads."""
+    loads = [name for name in LOADS if name in planes.coords and path.dim in planes.coords[name].dims]
+    if not loads:
+        return xr.Dataset()
+    values = planes.spread(planes.coords[loads[0]])
     rows = np.full((planes.count, len(RETURN_NAMES)), np.nan)
     for states in path.states:
-        for state, earlier in zip(states, same_load_steps(loads[states]), strict=True):
+        for state, earlier in zip(states, same_load_steps(values[states]), strict=True):
             if earlier >= 0:
                 before, after = planes.cells[states[earlier]], planes.cells[state]
                 change = planes.coverage[state] - planes.coverage[states[earlier]]
                 rows[state] = earlier, 1.0 - area_overlap(before, after), change
-    return rows
+    reason = f"NaN where the path has not come back to the same {loads[0]}, or both sets are empty"
+    return _labelled_rows(planes, rows, dict.fromkeys(RETURN_NAMES, reason))
 
 
 def same_load_steps(loads: Array) -> Array:
@@ -377,7 +365,8 @@ class Path:
         before[states[:, 1:]] = states[:, :-1]
         if along == "shear" and "shear" in planes.coords:
             travel[states[:, 1:]] = np.diff(planes.coords["shear"].values.astype(float))
-        units = np.array([read_direction(word).unit for word in _directions(planes)])
+        direction = planes.coords.get("azimuth", planes.coords.get("direction", xr.Variable((), "E")))
+        units = np.array([read_direction(word).unit for word in planes.spread(direction).tolist()])
         cells = FRAMES[frame] * travel[:, None] * units / np.array(planes.grid.spacing)
         return cls(along, states, before, travel, np.rint(cells).astype(np.int64), planes.grid.periodic)
 
@@ -395,15 +384,6 @@ class Path:
                 lines = np.moveaxis(plane, axis, 0)
                 lines[slice(None, cells) if cells > 0 else slice(cells, None)] = 0
         return plane
-
-
-def _directions(planes: Planes) -> list[Any]:
-    """Return the direction of sliding of every plane, a word or degrees; E where none is given."""
-    direction = planes.coords.get("azimuth", planes.coords.get("direction"))
-    if direction is None:
-        return ["E"] * planes.count
-    shape = [planes.shape[k] if dim in direction.dims else 1 for k, dim in enumerate(planes.dims)]
-    return list(np.broadcast_to(direction.values.reshape(shape), planes.shape).ravel().tolist())
 
 
 @dataclass(frozen=True)

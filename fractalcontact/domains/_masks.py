@@ -110,6 +110,12 @@ class Planes:
         values = np.asarray(values)
         return (*self.dims, *new_dims), values.reshape(self.shape + values.shape[1:])
 
+    def spread(self, coordinate: xr.Variable) -> Array:
+        """Return a coordinate of leading dims for each plane, (planes,)."""
+        sizes = dict(zip(self.dims, self.shape, strict=True))
+        spread: xr.Variable = coordinate.set_dims(sizes)  # type: ignore[no-untyped-call]
+        return np.asarray(spread.transpose(*self.dims).values.reshape(-1))
+
     def map(self, function: Callable[..., R], *columns: Iterable[Any], passes: int = 1) -> list[R]:
         """Apply a function that makes so many passes over a plane to each.
 
