@@ -130,28 +130,17 @@ class PairsInGaps:
         rank: int,
         longest: int,
         *,
-        is_aligned: bool,
         most_offsets: int = 9,
         most_numbers: int = 40,
         of_each: int = 8,
         most_places: int = 1 << 16,  # of larger planes so many are drawn, always the same
     ) -> None:
-        self.shape, self.rank, self.is_aligned = valid.shape, rank, is_aligned
+        self.shape, self.rank = valid.shape, rank
         self.most_offsets, self.most_numbers, self.of_each = most_offsets, most_numbers, of_each
         self.most_places = most_places
         continued = np.pad(valid, [(0, edge) for edge in self._box(longest)], mode="wrap")
         self._sums = np.pad(continued.astype(np.int32).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
-        self._pairs: dict[tuple[int, int], Pairs] = {}
-        self._places: dict[tuple[int, int], tuple[Array, Array, Array]] = {}
-
-    def __call__(self, first: int, second: int) -> Pairs:
-        """Return the pairs of a box and a box that is no larger."""
-        if (first, second) not in self._pairs:
-            find = self._aligned if self.is_aligned else self._any_place
-            a, b, shared, number = np.broadcast_arrays(*find(self._box(first), self._box(second)))
-            overlap = shared > 0
-            self._pairs[first, second] = a[overlap], b[overlap], shared[overlap], number[overlap]
-        return self._pairs[first, second]
+        self._chosen = cache(self._choose)
 
     def _box(self, size: int) -> tuple[int, int]:
         ny, nx = self.shape
@@ -165,21 +154,24 @@ class PairsInGaps:
         sums = self._sums
         return np.asarray(sums[bottom, right] - sums[top, right] - sums[bottom, left] + sums[top, left])
 
-    def _aligned(self, box: tuple[int, int], other: tuple[int, int]) -> Pairs:
-        starts = []
+    def aligned(self, first: int, second: int) -> Pairs:
+        """Return the pairs of boxes of the grids that start at the first cell."""
+        box, other, starts = self._box(first), self._box(second), []
         for n, edges in zip(self.shape, zip(box, other, strict=True), strict=True):
             starts.append(np.union1d(*(np.arange(0, n, edge) for edge in edges)))
         ends = [np.append(start[1:], n) for start, n in zip(starts, self.shape, strict=True)]
         low, high = np.meshgrid(*starts, indexing="ij"), np.meshgrid(*ends, indexing="ij")
         a, b = (self._observed(*self._box_around(low, edges)) for edges in (box, other))
-        return a, b, self._observed(low, high), np.ones(low[0].shape)
+        return _overlapping(a, b, self._observed(low, high), np.ones(low[0].shape))
 
     def _box_around(self, low: Sequence[Array], edges: tuple[int, int]) -> tuple[list[Array], list[Array]]:
         begin = [start // edge * edge for start, edge in zip(low, edges, strict=True)]
         end = [np.minimum(at + e, n) for at, e, n in zip(begin, edges, self.shape, strict=True)]
         return begin, end
 
-    def _any_place(self, box: tuple[int, int], other: tuple[int, int]) -> Pairs:
+    def any_place(self, first: int, second: int) -> Pairs:
+        """Return the pairs of a box at any place and a box that is no larger."""
+        box, other = self._box(first), self._box(second)
         y, x, stands_for = (values[:, None, None] for values in self._chosen(box))
         (dy, many_y), (dx, many_x) = map(self._offsets, box, other)
         top, left = y + dy[:, None], x + dx
@@ -188,12 +180,10 @@ class PairsInGaps:
         low = np.maximum(y, top), np.maximum(x, left)
         high = np.minimum(y + box[0], top + other[0]), np.minimum(x + box[1], left + other[1])
         grids = float(np.prod(box) * np.prod(other))  # offsets of both grids
-        return a, b, self._observed(low, high), stands_for * (many_y * many_x / grids)
+        return _overlapping(a, b, self._observed(low, high), stands_for * (many_y * many_x / grids))
 
-    def _chosen(self, box: tuple[int, int]) -> tuple[Array, Array, Array]:
+    def _choose(self, box: tuple[int, int]) -> tuple[Array, Array, Array]:
         """Return y and x of some boxes, and how many each stands for."""
-        if box in self._places:
-            return self._places[box]
         total = self.shape[0] * self.shape[1]
         places = np.arange(total)
         if total > self.most_places:
@@ -206,8 +196,7 @@ class PairsInGaps:
         parts = [order[at + np.arange(k) * n // k] for at, n, k in zip(first, members, some, strict=True)]
         chosen = np.concatenate(parts)
         stands_for = np.repeat(members / some, some) * (total / places.size)
-        self._places[box] = y[chosen], x[chosen], stands_for
-        return self._places[box]
+        return y[chosen], x[chosen], stands_for
 
     def _offsets(self, edge: int, other: int) -> tuple[Array, float]:
         """Return the offsets of the other box at which it overlaps, and how many each stands for."""
@@ -218,57 +207,10 @@ class PairsInGaps:
         return every[places.astype(np.int64)], every.size / self.most_offsets
 
 
-def count_covariance(
-    null: RandomCells,
-    shape: Sequence[int],
-    sizes: Array,
-    contents: Sequence[BoxContents],
-    pairs_of: Callable[[int, int, int], Pairs],
-    *,
-    is_aligned: bool,
-    never_empty: float = -60.0,  # ln q: 10^6 boxes have a standard deviation of 10^-7 at most
-) -> Array:
-    """Covariance of the counts at all pairs of sizes; `pairs_of` is `aligned`, or `any_place` for averages.
-
-    Exact on a periodic plane and on aligned grids. At free edges, where boxes at any place hold different
-    numbers of cells, the covariances of full boxes are scaled by what that changes in the variances on one
-    grid; the deviation of a dimension is then off by less than 10 %.
-    """
-    areas = np.array([np.prod(np.minimum(size, shape)) for size in sizes], np.int64)
-    scatters = null.log_miss(areas) > never_empty
-    covariance = np.zeros((sizes.size, sizes.size))
-    for i, first in enumerate(sizes.tolist()):
-        for j, second in enumerate(sizes[: i + 1].tolist()):
-            if is_aligned or (scatters[i] and scatters[j]):
-                axes = [pairs_of(n, first, second) for n in shape]
-                a, b, shared, number = (
-                    reduce(np.multiply.outer, values) for values in zip(*axes, strict=True)
-                )
-                covariance[i, j] = covariance[j, i] = np.sum(number * null.both_empty(a, b, shared))
-    if is_aligned:
-        return covariance
-    ratio = np.ones(sizes.size)
-    for i, (of, area) in enumerate(zip(contents, areas, strict=True)):
-        full = null.share_variance(replace(of, cells=np.array([area]), share=np.ones(1)))
-        if full > 0.0:
-            ratio[i] = np.sqrt(null.share_variance(of) / full)
-    return np.asarray(covariance * ratio[:, None] * ratio)
-
-
-def covariance_in_gaps(
-    null: RandomCells, sizes: Array, contents: Sequence[BoxContents], pairs_of: PairsInGaps
-) -> Array:
-    """Covariance of the counts at all pairs of ascending sizes, on a plane with gaps."""
-    sums = [of.boxes * float(of.share @ (of.cells * null.miss(of.cells))) for of in contents]
-    covariance = np.zeros((sizes.size, sizes.size))
-    for i, first in enumerate(sizes.tolist()):
-        for j, second in enumerate(sizes[: i + 1].tolist()):
-            a, b, shared, number = pairs_of(first, second)
-            apart = sums[i] * sums[j] - float(number @ (a * null.miss(a) * b * null.miss(b)))
-            value = float(number @ null.both_empty(a, b, shared)) - null.coupling * apart
-            covariance[i, j] = covariance[j, i] = value
-    counted = np.array([of.measure / of.boxes for of in contents])
-    return np.asarray(covariance * counted[:, None] * counted)
+def _overlapping(a: Array, b: Array, shared: Array, number: Array) -> Pairs:
+    pairs = np.broadcast_arrays(a, b, shared, number)
+    one, other, both, times = (values[pairs[2] > 0] for values in pairs)
+    return one, other, both, times
 
 
 def dimension_deviation(
@@ -310,28 +252,68 @@ class NullBoxes:
     """The boxes of a cover on one plane, whatever the cells of the null: contents by size, and pairs."""
 
     def __init__(self, planes: Planes, plane: int, sizes: Array, cover: str) -> None:
-        self.sides, self.is_aligned = planes.sides, cover == "aligned"
+        self.sides, self.is_aligned, self.has_gaps = (
+            planes.sides,
+            cover == "aligned",
+            planes.valid is not None,
+        )
         longest = max(1, min(planes.sides) // 2)
-        self.gaps: PairsInGaps | None = None
+        along = cache(aligned if self.is_aligned else any_place)
+
+        def on_all_axes(first: int, second: int) -> Pairs:
+            axes = [along(n, first, second) for n in self.sides]
+            a, b, shared, number = (reduce(np.multiply.outer, values) for values in zip(*axes, strict=True))
+            return a, b, shared, number
+
         if planes.valid is None:
             contents = [_full_contents(planes, size, longest, cover) for size in sizes.tolist()]
+            self.pairs = on_all_axes
         else:
             valid, observed = planes.valid[plane], int(planes.observed[plane])
             contents = _contents_in_gaps(valid, planes.periodic, observed, sizes, longest)
-            self.gaps = PairsInGaps(valid, planes.rank, int(sizes.max(initial=1)), is_aligned=self.is_aligned)
+            in_gaps = PairsInGaps(valid, planes.rank, int(sizes.max(initial=1)))
+            self.pairs = cache(in_gaps.aligned if self.is_aligned else in_gaps.any_place)
         self.contents = dict(zip(sizes.tolist(), contents, strict=True))
-        self.along = cache(aligned if self.is_aligned else any_place)  # for all nulls of a stack
 
     def expected_counts(self, null: RandomCells, sizes: Array) -> Array:
         """Return the boxes of each size that meet the null."""
         return null.expected_counts([self.contents[size] for size in sizes.tolist()])
 
-    def covariance(self, null: RandomCells, sizes: Array) -> Array:
-        """Return the covariance of the counts at all pairs of ascending sizes."""
+    def covariance(
+        self,
+        null: RandomCells,
+        sizes: Array,
+        *,
+        never_empty: float = -60.0,  # ln q: 10^6 boxes have a standard deviation of 10^-7 at most
+    ) -> Array:
+        """Return the covariance of the counts at all pairs of ascending sizes.
+
+        Exact without gaps on a periodic plane and on aligned grids. At free edges, where boxes at any place
+        hold different numbers of cells, the covariances of full boxes are scaled by what that changes in the
+        variances on one grid; the deviation of a dimension is then off by less than 10 %. In gaps boxes that
+        do not overlap are taken together, see `coupling`.
+        """
         contents = [self.contents[size] for size in sizes.tolist()]
-        if self.gaps is not None:
-            return covariance_in_gaps(null, sizes, contents, self.gaps)
-        return count_covariance(null, self.sides, sizes, contents, self.along, is_aligned=self.is_aligned)
+        areas = np.array([np.prod(np.minimum(size, self.sides)) for size in sizes], np.int64)
+        scatters = null.log_miss(areas) > never_empty
+        sums = [of.boxes * float(of.share @ (of.cells * null.miss(of.cells))) for of in contents]
+        covariance = np.zeros((sizes.size, sizes.size))
+        for i, first in enumerate(sizes.tolist()):
+            for j, second in enumerate(sizes[: i + 1].tolist()):
+                if not (self.is_aligned or self.has_gaps or (scatters[i] and scatters[j])):
+                    continue
+                a, b, shared, number = self.pairs(first, second)
+                value = np.sum(number * null.both_empty(a, b, shared))
+                if self.has_gaps:
+                    overlapping = np.sum(number * (a * null.miss(a) * b * null.miss(b)))
+                    value -= null.coupling * (sums[i] * sums[j] - overlapping)
+                covariance[i, j] = covariance[j, i] = value
+        scale = np.array([of.measure / of.boxes for of in contents])
+        if not (self.is_aligned or self.has_gaps):
+            for i, (of, area) in enumerate(zip(contents, areas, strict=True)):
+                full = null.share_variance(replace(of, cells=np.array([area]), share=np.ones(1)))
+                scale[i] = np.sqrt(null.share_variance(of) / full) if full > 0.0 else 1.0
+        return np.asarray(covariance * scale[:, None] * scale)
 
 
 def _contents_in_gaps(
