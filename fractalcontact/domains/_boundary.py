@@ -21,6 +21,7 @@ SOURCE = "Falconer, Fractal Geometry (1990), ch. 3; Bale and Schmidt, Phys. Rev.
 # pairs along the axes and along the diagonals, at a lag of one step and then of two
 OFFSETS = np.kron([[1], [2]], [(0, 1), (1, 0), (1, 1), (1, -1)])
 LAGS = np.hypot(*OFFSETS.T)  # in cells
+REACH = 2  # cells of the longest offset along an axis
 
 
 @public_result(title="Dimension of the boundary of a set", references=SOURCE, check=_masks.check_mask)
@@ -100,9 +101,12 @@ def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, A
     """Return observed pairs and differing pairs, (blocks, offsets)."""
     shape = (BLOCKS, BLOCKS, len(OFFSETS))
     pairs, differing = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
-    observed = np.ones_like(cells) if valid is None else valid
-    wrap_y, wrap_x = grid.periodic
-    count_differing_pairs(cells, observed, OFFSETS, wrap_y, wrap_x, pairs, differing)
+    # beyond a free edge nothing was observed
+    around = np.ones_like(cells) if valid is None else valid
+    for axis, wraps in enumerate(grid.periodic):
+        widths = [(REACH if own == axis else 0,) * 2 for own in (0, 1)]
+        cells, around = (np.pad(each, widths, "wrap" if wraps else "constant") for each in (cells, around))
+    count_differing_pairs(cells, around, OFFSETS, pairs, differing)
     return pairs.reshape(-1, len(OFFSETS)), differing.reshape(-1, len(OFFSETS))
 
 
@@ -258,49 +262,27 @@ def _notes(
 
 
 @kernel
-def _compare_rows(here: Array, there: Array, seen: Array, seen_there: Array) -> tuple[np.int32, np.int32]:
-    """Count the pairs of two rows of cells that were observed, and those that differ."""
-    observed, differing = np.int32(0), np.int32(0)
-    for j in range(here.size):
-        both = seen[j] & seen_there[j]
-        observed += np.int32(both)
-        differing += np.int32(both & (here[j] ^ there[j]))
-    return observed, differing
-
-
-@kernel
-def count_differing_pairs(
-    mask: Array, valid: Array, offsets: Array, wrap_y: bool, wrap_x: bool, pairs: Array, differing: Array
-) -> None:
+def count_differing_pairs(mask: Array, valid: Array, offsets: Array, pairs: Array, differing: Array) -> None:
     """Count observed pairs and differing pairs for every offset, in blocks of the plane.
 
-    `offsets` is (lags, 2), rows (>= 0) and columns down and right; `pairs` and `differing` are
-    (blocks, blocks, lags) int64. A pair belongs to the block of its first cell.
+    `mask` and `valid` are continued by `REACH` cells beyond each edge. `offsets` is (lags, 2), rows and
+    columns down and right; `pairs` and `differing` are (blocks, blocks, lags) int64. A pair belongs to the
+    block of its first cell.
     """
-    ny, nx = mask.shape
+    ny, nx = mask.shape[0] - 2 * REACH, mask.shape[1] - 2 * REACH
     blocks = pairs.shape[0]
     for lag in range(offsets.shape[0]):
         down, right = offsets[lag, 0], offsets[lag, 1]
-        for i in range(ny if wrap_y else ny - down):
-            here, seen = mask[i], valid[i]
-            there, seen_there = mask[(i + down) % ny], valid[(i + down) % ny]
-            row = i * blocks // ny
+        for i in range(ny):
             for column in range(blocks):
-                start, stop = -(-column * nx // blocks), -(-(column + 1) * nx // blocks)
-                low, high = max(start, -right, 0), max(min(stop, nx - right), max(start, -right, 0))
-                count, changed = _compare_rows(
-                    here[low:high],
-                    there[low + right : high + right],
-                    seen[low:high],
-                    seen_there[low + right : high + right],
-                )
-                pairs[row, column, lag] += count
-                differing[row, column, lag] += changed
-                if not wrap_x:
-                    continue
-                for j in range(start, stop):
-                    if j + right < 0 or j + right >= nx:
-                        beyond = (j + right) % nx
-                        both = seen[j] & seen_there[beyond]
-                        pairs[row, column, lag] += both
-                        differing[row, column, lag] += both & (here[j] ^ there[beyond])
+                start, stop = -(-column * nx // blocks) + REACH, -(-(column + 1) * nx // blocks) + REACH
+                here, seen = mask[i + REACH, start:stop], valid[i + REACH, start:stop]
+                there = mask[i + REACH + down, start + right : stop + right]
+                seen_there = valid[i + REACH + down, start + right : stop + right]
+                observed, changed = np.int32(0), np.int32(0)
+                for j in range(here.size):
+                    both = seen[j] & seen_there[j]
+                    observed += np.int32(both)
+                    changed += np.int32(both & (here[j] ^ there[j]))
+                pairs[i * blocks // ny, column, lag] += observed
+                differing[i * blocks // ny, column, lag] += changed
