@@ -91,11 +91,11 @@ class PeriodicOperator(Operator):
     def apply(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement under `pressure`, without its mean."""
         self.transforms += 1
-        return self.multiplier.apply(pressure, 2.0, invert=True, mean=0.0, out=out)
+        return self.multiplier.apply(pressure, out)
 
     def filter_and_work(self, pressure: Array) -> float:
         """Compute the modes of the displacement, and the work from them."""
-        return self.multiplier.work(pressure, 2.0, invert=True, mean=0.0)
+        return self.multiplier.work(pressure)
 
     def from_modes(self, out: Array | None = None) -> Array:
         """Return the displacement with the present modes."""
@@ -195,43 +195,45 @@ class PairSum(Operator):
 
 
 class WavenumberMultiplier:
-    """Multiplies the modes of a plane by |q| or 1/|q|, without a table of |q| (another array)."""
+    """Multiplies the modes of a plane by 2/|q|, the compliance of a half-space, and takes off its mean.
 
-    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float], memory: ModesMemory) -> None:
+    With a stiffness of the mean it does the inverse, |q|/2. It needs no table of |q|, another array.
+    """
+
+    def __init__(
+        self, shape: tuple[int, int], spacing: tuple[float, float], memory: ModesMemory, mean: float = 0.0
+    ) -> None:
         self.shape, self.spacing, self.memory = shape, spacing, memory
+        self.law = (0.5, False, mean) if mean else (2.0, True, 0.0)  # factor, whether it is 1/|q|, mean
         self.transform = fft.PlaneTransform(shape)
         self.modes: Any = None  # from one transform to its inverse
         self.is_small = shape[0] * shape[1] <= SMALL
 
-    def apply(
-        self, plane: Array, factor: float, *, invert: bool, mean: float, out: Array | None = None
-    ) -> Array:
-        """Return the plane with its modes times factor |q| (or factor / |q|) and its mean times `mean`.
+    def apply(self, plane: Array, out: Array | None = None) -> Array:
+        """Return the plane with its modes multiplied.
 
         Where the FFT library can, it writes into `out`, which may be the plane itself.
         """
         if self.is_small:
-            return self.apply_at_once(plane, factor, invert, mean, out)
-        self.filter_modes(plane, factor, invert, mean, NO_WORK)
+            return self.apply_at_once(plane, out)
+        self.filter_modes(plane, NO_WORK)
         return self.from_modes(out)
 
-    def apply_at_once(
-        self, plane: Array, factor: float, invert: bool, mean: float, out: Array | None
-    ) -> Array:
+    def apply_at_once(self, plane: Array, out: Array | None) -> Array:
         """Return the plane filtered by a table, a call for each transform."""
         modes = self.transform.forward(plane, self.memory.array(self.shape, plane.dtype))
-        weights = wavenumber_weights(self.shape, self.spacing, factor, invert, mean, plane.dtype.char)
+        weights = wavenumber_weights(self.shape, self.spacing, *self.law, plane.dtype.char)
         parts = modes.view(plane.dtype)
         np.multiply(parts, weights, out=parts)
         return self.transform.backward(modes, out if self.transform.in_place else None)
 
-    def work(self, plane: Array, factor: float, *, invert: bool, mean: float) -> float:
+    def work(self, plane: Array) -> float:
         """Return the sum of a plane times what `apply` would return, and keep the modes for `plane`."""
         work = np.empty(self.shape[1] // 2 + 1)
-        self.filter_modes(plane, factor, invert, mean, work)
+        self.filter_modes(plane, work)
         return sum_of_modes(work, self.shape)
 
-    def filter_modes(self, plane: Array, factor: float, invert: bool, mean: float, work: Array) -> None:
+    def filter_modes(self, plane: Array, work: Array) -> None:
         """Set the modes of the filtered plane, and `work` to the sums over their columns."""
         from fractalcontact.contact._kernels import scale_modes
 
@@ -239,6 +241,7 @@ class WavenumberMultiplier:
         qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(self.shape, self.spacing))
         memory = self.memory.array(self.shape, dtype)
         self.modes = modes = self.transform.forward(plane, memory)
+        factor, invert, mean = self.law
         weights = (qy2, qx2, dtype(factor), invert, dtype(mean), work)
         in_bands(scale_modes, modes.shape[1], modes.size, fft.real_parts(modes), *weights)
 

@@ -64,7 +64,6 @@ class ExtensionPreconditioner:
 
     def __init__(self, body: Body, memory: ModesMemory, dtype: Any) -> None:
         (self.bin_rows, self.bin_columns), self.plane_shape, self.bin_shape = bin_layout(body)
-        self.multiplier = WavenumberMultiplier(self.plane_shape, body.spacing, memory)
         edge = (self.bin_rows * body.spacing[0], self.bin_columns * body.spacing[1])
         tables = kept_bin_tables if body.is_small else bin_tables
         self.poisson_kernel, compliance = tables(self.bin_shape, edge, np.dtype(dtype).char)
@@ -73,7 +72,7 @@ class ExtensionPreconditioner:
         self.self_compliance = float(np.sqrt(body.spacing[0] * body.spacing[1])) / 2
         extent = np.sqrt(self.plane_shape[0] * body.spacing[0] * self.plane_shape[1] * body.spacing[1])
         # that of a flat block under a rigid flat; a periodic body has no stiffness for its mean
-        self.mean_stiffness = 1.0 / float(extent)
+        self.multiplier = WavenumberMultiplier(self.plane_shape, body.spacing, memory, 1.0 / float(extent))
         self.dtype = dtype
         self.transforms = 0
 
@@ -102,7 +101,7 @@ class ExtensionPreconditioner:
         size = self.plane_shape[0] * self.plane_shape[1]
         grid = (self.bin_rows, self.bin_columns, free_set.mask)
         in_bands(_kernels.fill_outside, self.bin_shape[0], size, *grid, extension, x)
-        pressure = self.multiplier.apply(x, 0.5, invert=False, mean=self.mean_stiffness, out=x)
+        pressure = self.multiplier.apply(x, out=x)
         outside = extension  # the array is not needed any more
         in_bands(_kernels.sum_outside, self.bin_shape[0], size, *grid, pressure, outside)
         outside *= weight
@@ -183,8 +182,8 @@ def stiffness_table(body: Body) -> Array:
     impulse = np.zeros(plane)
     impulse[0, 0] = 1.0
     extent = float(np.sqrt(ny * body.spacing[0] * nx * body.spacing[1]))
-    waves = WavenumberMultiplier(plane, body.spacing, ModesMemory())
-    return np.ascontiguousarray(waves.apply(impulse, 0.5, invert=False, mean=1.0 / extent)[:ny, :nx])
+    waves = WavenumberMultiplier(plane, body.spacing, ModesMemory(), 1.0 / extent)
+    return np.ascontiguousarray(waves.apply(impulse)[:ny, :nx])
 
 
 def bin_layout(body: Body) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
