@@ -83,14 +83,13 @@ def flat_stiffness(
         problems.number("contact_modulus", contact_modulus, above=0)
         has_boundary = problems.choice("boundary", boundary, BOUNDARIES)
         problems.choice("loading", loading, ("rigid", "uniform"))
-        has_shape = problems.require(
-            getattr(as_array(shape), "shape", None) == (2,), "shape", "(ny, nx)", shape
-        )
+        is_pair = getattr(as_array(shape), "shape", None) == (2,)
+        has_shape = problems.require(is_pair, "shape", "(ny, nx)", shape)
         has_shape = has_shape and all(problems.integer("shape", n, at_least=3) for n in shape)
         has_spacing = problems.numbers("spacing", spacing, above=0, at_most=10.0**DECADES)
-        has_spacing = has_spacing and problems.require(
-            float_array(spacing).size in (1, 2), "spacing", "one length or (dy, dx)", spacing
-        )
+        if has_spacing:
+            one_or_two = float_array(spacing).size in (1, 2)
+            has_spacing = problems.require(one_or_two, "spacing", "one length or (dy, dx)", spacing)
         # without the boundary, which is checked above: here it may not be None
         options = problems.construct(ContactOptions, influence=influence, disc_radius=disc_radius)
         if has_boundary and has_shape and has_spacing and options is not None:
@@ -103,13 +102,11 @@ def block_stiffness(
     grid: Grid, contact_modulus: float, options: ContactOptions, loading: str = "rigid"
 ) -> float:
     """Return the stiffness (N/m) of the flat block on a grid, see `flat_stiffness`."""
-    cells, pair = (grid.shape[0], grid.shape[1]), (grid.spacing[0], grid.spacing[1])
-    influence = options.influence_on(grid)
-    body = scaled_body(cells, pair, options.is_periodic(grid), influence, options.disc_radius)
+    body = scaled_body(grid, options)
     compliance = flat_block(body).closure if loading == "rigid" else uniform_compliance(body)
     if compliance == 0:
         return math.inf
-    return float(contact_modulus * length_unit(pair) * body.cell_area / compliance)
+    return float(contact_modulus * length_unit(grid) * body.cell_area / compliance)
 
 
 def _grid(shape: Any, spacing: Any, boundary: str) -> Grid:

@@ -166,17 +166,12 @@ def scaled_path(
 ) -> ScaledPath:
     """Return the scaled problem with its load path."""
     control, values = load.solver_values(grid.nominal_area)
-    spacing = (grid.spacing[0], grid.spacing[1])
     gap = heights.max() - heights
-    units = make_units(spacing, float(gap.max()), contact_modulus, control, float(values.max()))
+    units = make_units(grid, float(gap.max()), contact_modulus, load)
     gap /= units.height
-    shape = (grid.shape[0], grid.shape[1])
-    periodic, influence = options.is_periodic(grid), options.influence_on(grid)
-    body = scaled_body(shape, spacing, periodic, influence, options.disc_radius)
     hardness = np.inf if options.hardness is None else options.hardness
-    return ScaledPath(
-        body, units, gap, control, tuple(values.tolist()), hardness, options.tolerance, options.method
-    )
+    imposed, body = tuple(values.tolist()), scaled_body(grid, options)
+    return ScaledPath(body, units, gap, control, imposed, hardness, options.tolerance, options.method)
 
 
 def solve_path(

@@ -52,8 +52,7 @@ def effective_modulus(
     with Problems("fractalcontact.contact.effective_modulus") as problems:
         _check_pair(problems, young, poisson, young2, poisson2)
     first = _compliance(young, poisson)
-    second = first if young2 is None else _compliance(young2, poisson2)
-    return 1.0 / (first + second)
+    return 1.0 / (first + (first if young2 is None else _compliance(young2, poisson2)))
 
 
 def effective_poisson(

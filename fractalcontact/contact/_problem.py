@@ -248,8 +248,7 @@ def check_scale(
     """Check that heights, modulus, hardness and load are in proportion, so that no product overflows."""
     hardness = options.hardness
     control, values = load.solver_values(grid.nominal_area)
-    spacing = (grid.spacing[0], grid.spacing[1])
-    units = make_units(spacing, height_range, contact_modulus, control, float(values.max()))
+    units = make_units(grid, height_range, contact_modulus, load)
     scales = {
         "spacing": (units.length, "m"),
         "range of heights": (units.height, "m"),
@@ -387,32 +386,28 @@ def kept_operator(body: Body) -> HalfSpaceOperator:
     return HalfSpaceOperator(body.influence_table())
 
 
-def make_units(
-    spacing: tuple[float, float], height_range: float, modulus: float, control: str, largest: float
-) -> Units:
+def make_units(grid: Grid, height_range: float, modulus: float, load: LoadPath) -> Units:
     """Return the scales of a problem; a flat surface is measured by its largest closure or force."""
-    length = length_unit(spacing)
-    height = height_range
+    length, height = length_unit(grid), height_range
     if height == 0:
+        control, values = load.solver_values(grid.nominal_area)
+        largest = float(values.max())
         height = largest if control == "closure" else largest / modulus / length
-    cell_area = (spacing[0] / length) * (spacing[1] / length)
+    cell_area = (grid.spacing[0] / length) * (grid.spacing[1] / length)
     return Units(length, power_of_two(height), modulus, cell_area)
 
 
-def scaled_body(
-    shape: tuple[int, int], spacing: tuple[float, float], periodic: bool, influence: str, disc_radius: str
-) -> Body:
-    """Return the scaled body of a grid, from valid options in SI units."""
-    unit = length_unit(spacing)
-    scaled = (spacing[0] / unit, spacing[1] / unit)
-    if influence != "disc":
-        return Body(shape, scaled, periodic, influence, 0.0)
-    return Body(shape, scaled, periodic, influence, _influence.disc_radius(disc_radius, scaled))
+def scaled_body(grid: Grid, options: ContactOptions) -> Body:
+    """Return the scaled body of a grid under valid options."""
+    (ny, nx), unit = grid.shape, length_unit(grid)
+    spacing, influence = (grid.spacing[0] / unit, grid.spacing[1] / unit), options.influence_on(grid)
+    radius = _influence.disc_radius(options.disc_radius, spacing) if influence == "disc" else 0.0
+    return Body((ny, nx), spacing, options.is_periodic(grid), influence, radius)
 
 
-def length_unit(spacing: tuple[float, float]) -> float:
+def length_unit(grid: Grid) -> float:
     """Return the power of two in which lengths of the plane are measured."""
-    return power_of_two(max(spacing))
+    return power_of_two(max(grid.spacing))
 
 
 def strips(

@@ -48,10 +48,8 @@ def _check(problems: Problems) -> None:
     load = problems.construct(LoadPath.among, vars(given))
     if surface_is_valid and modulus_is_valid and load is not None and not problems.messages:
         height_range = float(given.surface.values.max()) - float(given.surface.values.min())
-        elastic = ContactOptions()
-        check_scale(
-            problems, read_grid(given.surface), height_range, float(given.contact_modulus), elastic, load
-        )
+        grid, modulus = read_grid(given.surface), float(given.contact_modulus)
+        check_scale(problems, grid, height_range, modulus, ContactOptions(), load)
 
 
 @public_result(

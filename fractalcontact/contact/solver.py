@@ -27,41 +27,22 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import CONTACT, OPEN, SLIP_MAPS, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems
-from fractalcontact.contact._flat_block import block_stiffness
+from fractalcontact.contact._flat_block import block_stiffness as block_stiffness
 from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path
-from fractalcontact.contact._problem import CONTROLS, FORCE_ROUNDING, ContactOptions, LoadPath, check_scale
+from fractalcontact.contact._problem import FORCE_ROUNDING
+from fractalcontact.contact._problem import ContactOptions as ContactOptions
+from fractalcontact.contact._problem import LoadPath as LoadPath
+from fractalcontact.contact._problem import check_scale as check_scale
 from fractalcontact.contact._superposition import (
     ACCEPTABLE_ERROR,
-    METHODS,
-    ShearPath,
     Superposition,
     reduced_forces,
     shear_states,
     solve_reduced,
     superposition_error,
 )
-
-__all__ = [
-    "CONTROLS",
-    "METHODS",
-    "ContactOptions",
-    "LoadPath",
-    "Pressed",
-    "ShearPath",
-    "Sheared",
-    "block_stiffness",
-    "check_one_load",
-    "check_scale",
-    "check_shear",
-    "check_sliding",
-    "normal_stiffness",
-    "rms_slope",
-    "solve",
-    "solve_shear",
-    "solvers_in_words",
-    "warn_lay",
-    "warn_steep",
-]
+from fractalcontact.contact._superposition import METHODS as METHODS
+from fractalcontact.contact._superposition import ShearPath as ShearPath
 
 PRESSURE_CLASSES = 50  # of a distribution, from 0 to the greatest pressure: enough for a curve of a plot
 
