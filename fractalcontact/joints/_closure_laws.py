@@ -140,22 +140,19 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     if "converged" in closure and not closure["converged"].values.all():
         message = "fractalcontact.joints.closure_laws: steps that did not converge are fitted like the others"
         warn(message, ConvergenceWarning)
-    fits, flags, stiffnesses, seated = [], [], [], []
+    paths: list[dict[str, Any]] = []
     for w, p in zip(interface.values.reshape(-1, steps), pressure.values.reshape(-1, steps), strict=True):
         counted = w if seat is None else w - closure_at(seat, p, w)
-        fit, flag = fit_laws(p, counted, seat, rounding)
-        fits.append(fit)
-        flags.append(flag)
-        seated.append(counted)
-        stiffnesses.append(stiffness(p, w, rounding))
-    columns = {name: np.array([fit[name] for fit in fits]) for name in (*FITS, *ENDS, "law_score")}
-    variables: dict[str, Any] = {
-        name: (outer, values.reshape(interface.shape[:-1])) for name, values in columns.items()
-    }
-    variables["preferred_law"] = outer, np.reshape(np.array(flags, dtype=np.int8), interface.shape[:-1])
-    variables["stiffness"] = interface.dims, np.reshape(stiffnesses, interface.shape)
-    if seat is not None:
-        variables["seated_closure"] = interface.dims, np.reshape(seated, interface.shape)
+        of_steps = {"stiffness": stiffness(p, w, rounding), "seated_closure": counted}
+        paths.append(fit_laws(p, counted, seat, rounding) | of_steps)
+    variables: dict[str, Any] = {}
+    for name in (*FITS, *ENDS, "law_score", "preferred_law", "stiffness", "seated_closure"):
+        dims = interface.dims if name in ("stiffness", "seated_closure") else outer
+        values = np.array([path[name] for path in paths])
+        variables[name] = dims, values.reshape([interface.sizes[dim] for dim in dims])
+    if seat is None:
+        del variables["seated_closure"]
+    else:
         variables["seating_pressure"] = (), seat
     result = xr.Dataset(variables, leading_coords(closure, interface.dims, taken=(*variables, "run_time")))
     result["preferred_law"].attrs["comment"] = PREFERENCE
@@ -165,24 +162,25 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
 
 def fit_laws(
     pressure: Array, closure: Array, seat: float | None = None, rounding: float = 0.0, level: float = 0.95
-) -> tuple[dict[str, float], np.int8]:
+) -> dict[str, Any]:
     """Return constants, intervals and misfits of both laws, their score, and the flag of the better one.
 
     A closure that varies by no more than `rounding` has no law; `level` is that of the intervals.
     """
-    fit = dict.fromkeys((*FITS, *ENDS, "law_score"), math.nan)
+    fit: dict[str, Any] = dict.fromkeys((*FITS, *ENDS, "law_score"), math.nan)
+    fit["preferred_law"] = PREFERRED_LAW["undecided"]
     steps = first_loading(pressure, closure)
     if seat is not None:
         steps = steps[pressure[steps] > seat]
     if steps.size < 3 or not np.ptp(closure[steps]) > rounding:  # a law has two parameters
-        return fit, PREFERRED_LAW["undecided"]
+        return fit
     p, w = pressure[steps], closure[steps]
     exponential = fit_exponential(p, w, level)
     hyperbola = fit_hyperbola(p if seat is None else p - seat, w, level)
     fit |= dict(zip(FITS, (*exponential.constants, *hyperbola.constants), strict=True))
     fit |= dict(zip(ENDS, (*exponential.ends, *hyperbola.ends), strict=True))
-    fit["law_score"], flag = preferred_law(exponential.residual, hyperbola.residual, float(np.ptp(w)))
-    return fit, flag
+    score, flag = preferred_law(exponential.residual, hyperbola.residual, float(np.ptp(w)))
+    return fit | {"law_score": score, "preferred_law": flag}
 
 
 def preferred_law(

@@ -160,20 +160,18 @@ def roughness_coefficient(
     directions = read_directions(chosen_direction)
     interval = _lag_or_default(lag, regression)
     heights = detrended(np.asarray(surface.values, dtype=np.float64), 1)[0]
-    count = len(directions)
-    slopes, lags, intervals = np.empty(count), np.empty(count), np.empty(count)
-    coefficient, limits = np.empty(count), np.full((2, count), np.nan)
+    rows, limits = [], np.full((2, len(directions)), np.nan)
     with Problems(WHERE) as problems:
         for i, towards in enumerate(directions):
             lines = _profile_slopes(heights, grid.spacing, towards, interval)
-            slopes[i], lags[i] = lines.slope, lines.lag
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / lines.lag)))
-            intervals[i], coefficient[i] = fitted.interval, _coefficient(fitted, lines.slope)
+            rows.append((_coefficient(fitted, lines.slope), lines.slope, lines.lag, fitted.interval))
             # JRC grows with Z2: the quantiles correspond. Below 20 profiles the low one is beyond all but one
             if lines.of_profiles.size >= 20:
                 limits[:, i] = _coefficient(fitted, np.quantile(lines.of_profiles, (0.025, 0.975)))
             expected = f"heights {interval:g} m apart towards {towards.name}"
-            problems.require(math.isfinite(slopes[i]), "surface", expected, NONE)
+            problems.require(math.isfinite(lines.slope), "surface", expected, NONE)
+    coefficient, slopes, lags, intervals = np.transpose(rows)
     position = (coefficient > LARGEST_JRC).astype(np.int8) - (coefficient < 0)
     limits[:, ~np.isfinite(limits).all(axis=0)] = np.nan
     variables = {
