@@ -17,28 +17,21 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.contact import solver
 from fractalcontact.contact._problem import ContactOptions, LoadPath, check_problem
-from fractalcontact.contact.solver import (
-    Sheared,
-    ShearPath,
-    check_one_load,
-    check_shear,
-    check_sliding,
-    solve_shear,
-    warn_lay,
-)
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
     problems.number("poisson", above=-1, at_most=0.5)
-    check_shear(problems)
+    solver.check_shear(problems)
     check_direction(problems)
     load = check_problem(problems, method="fast")
-    if load is not None and check_one_load(problems, load):
+    if load is not None and solver.check_one_load(problems, load):
         friction, poisson = given.friction_coefficient, given.poisson
-        path = ShearPath.read(given.tangential_force, given.direction, friction, poisson, given.method)
-        check_sliding(problems, path, float(load.solver_values(read_grid(given.surface).nominal_area)[1][0]))
+        path = solver.ShearPath.read(given.tangential_force, given.direction, friction, poisson, given.method)
+        normal_force = load.solver_values(read_grid(given.surface).nominal_area)[1]
+        solver.check_sliding(problems, path, float(normal_force[0]))
 
 
 @public_result(
@@ -147,10 +140,10 @@ def partial_slip(
         {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     )
     grid = read_grid(surface)
-    path = ShearPath.read(tangential_force, direction, friction_coefficient, poisson, method)
+    path = solver.ShearPath.read(tangential_force, direction, friction_coefficient, poisson, method)
     heights = np.asarray(surface.values, dtype=np.float64)
     problem = (grid, float(contact_modulus), options, load)
-    sheared = solve_shear(heights, *problem, path, keep=word_tuple(keep), progress=progress)
+    sheared = solver.solve_shear(heights, *problem, path, keep=word_tuple(keep), progress=progress)
     result = _dataset(surface, grid, sheared).assign(
         contact_modulus=float(contact_modulus),
         poisson=path.poisson,
@@ -164,14 +157,14 @@ def partial_slip(
     stiffness = result["tangential_stiffness"]
     result["tangential_stiffness"] = stiffness.where(np.isfinite(stiffness))
     if sheared.method == "superposition":
-        warn_lay("fractalcontact.contact.partial_slip: the contact", sheared.superposition_error)
+        solver.warn_lay("fractalcontact.contact.partial_slip: the contact", sheared.superposition_error)
     residual = float(np.fmax.reduce(result["residual"].values))
     stated = {"method": sheared.method, **options.stated_on(grid), "solver": sheared.normal.solution.solver}
     result.attrs.update(stated, achieved_residual=residual)
     return result
 
 
-def _dataset(surface: xr.DataArray, grid: Grid, sheared: Sheared) -> xr.Dataset:
+def _dataset(surface: xr.DataArray, grid: Grid, sheared: solver.Sheared) -> xr.Dataset:
     """Return the Dataset over all steps."""
     variables: dict[str, Any] = {name: ("step", column) for name, column in sheared.columns.items()}
     variables["contact_area"] = sheared.contact_area

@@ -16,15 +16,8 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.contact import solver
 from fractalcontact.contact._problem import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
-from fractalcontact.contact.solver import (
-    PRESSURE_CLASSES,
-    Pressed,
-    rms_slope,
-    solve,
-    solvers_in_words,
-    warn_steep,
-)
 
 UNDETERMINED = (
     "normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement",
@@ -161,20 +154,20 @@ def press(
     heights = np.asarray(surface.values, dtype=np.float64)
     names, further = word_tuple(keep), word_tuple(include)
 
-    def pressed(plane: Array, progress: bool) -> Pressed:
+    def pressed(plane: Array, progress: bool) -> solver.Pressed:
         problem = (grid, float(contact_modulus), options, load)
-        return solve(plane, *problem, keep=names, include=further, progress=progress)
+        return solver.solve(plane, *problem, keep=names, include=further, progress=progress)
 
     stack = heights.reshape(-1, *grid.shape)
     planes = _pressed_planes(stack, pressed, progress)
-    slopes = [rms_slope(plane, grid) for plane in stack]
+    slopes = [solver.rms_slope(plane, grid) for plane in stack]
     result = _dataset(surface, grid, float(contact_modulus), load, planes, slopes)
     _add_reasons(result)
-    warn_steep("fractalcontact.contact.press: the surface", max(slopes))
+    solver.warn_steep("fractalcontact.contact.press: the surface", max(slopes))
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
     # the result has none, and here each step has its own
     residual = float(np.fmax.reduce(result.variables["residual"].values, axis=None))
-    solvers = solvers_in_words(name for plane in planes for name in plane.solvers)
+    solvers = solver.solvers_in_words(name for plane in planes for name in plane.solvers)
     stated = {"references": options.references(grid), **options.stated_on(grid), "solver": solvers}
     result.attrs.update(stated, achieved_residual=residual)
     return result
@@ -182,19 +175,19 @@ def press(
 
 def _pressed_planes(
     planes: Array,
-    pressed: Callable[[Array, bool], Pressed],
+    pressed: Callable[[Array, bool], solver.Pressed],
     progress: bool,
     *,
     small: int = 512 * 512,  # nodes
     # surfaces for each thread between two steps of the progress bar; 2 and 32 took 1.15 and .86 of the
     # processor time with 64 surfaces of 64 x 64 points, once each
     side_by_side: int = 8,
-) -> list[Pressed]:
+) -> list[solver.Pressed]:
     """Press all planes: small ones side by side on a thread each, large ones one after the other."""
     if len(planes) == 1:
         return [pressed(planes[0], progress)]
     together = side_by_side * thread_count() if planes[0].size <= small else 1
-    results: dict[int, Pressed] = {}
+    results: dict[int, solver.Pressed] = {}
 
     def press_some(start: int, stop: int, first: int) -> None:
         with limit(1):
@@ -215,7 +208,7 @@ def _dataset(
     grid: Grid,
     contact_modulus: float,
     load: LoadPath,
-    planes: Sequence[Pressed],
+    planes: Sequence[solver.Pressed],
     slopes: Sequence[float],
 ) -> xr.Dataset:
     """Return the Dataset over all planes and steps."""
@@ -232,7 +225,7 @@ def _dataset(
     coords[load.control] = ("step", np.array(load.values))  # as given, without rounding
     coords["step"] = np.arange(steps)
     if "area_share" in variables:
-        coords["pressure_class"] = (np.arange(PRESSURE_CLASSES) + 0.5) / PRESSURE_CLASSES
+        coords["pressure_class"] = (np.arange(solver.PRESSURE_CLASSES) + 0.5) / solver.PRESSURE_CLASSES
     variables["nominal_area"] = grid.nominal_area
     variables["contact_modulus"] = contact_modulus
     variables["rms_slope"] = (leading, np.array(slopes).reshape(lengths))

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.validation import Problems
-from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._fields import MAPS
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
@@ -22,16 +22,6 @@ from fractalcontact.plotting._inputs import (
     words,
 )
 from fractalcontact.plotting._line_panel import LinePanel
-from fractalcontact.plotting._paths import (
-    PATH,
-    at_end,
-    at_shear,
-    by_decades,
-    by_shear,
-    loaded_steps,
-    middle_shear,
-    path_axis,
-)
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, scale_of
 
@@ -59,11 +49,12 @@ def closure_laws(
     """
     if laws is not None:
         return _draw_laws(result, laws, key, log, units, ax)
-    data = result_of(result, ("closure", "normal_force"), PATH, units)
+    names = ("closure", "normal_force")
+    data = result_of(result, names, _paths.PATH, units)
     with Problems("fc.plotting") as problems:
         last = data.sizes["step"] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
-    panel = LinePanel.of(ax, data, "closure", "normal_force", PATH, by_shear(data), x_name="closure")
+    panel = LinePanel.of(ax, data, *names, _paths.PATH, _paths.by_shear(data), x_name="closure")
     inner = "interface_closure" if "interface_closure" in data else "closure"
     if inner == "interface_closure":
         panel.curves("interface closure", x=inner, key=r"interface, $w_\mathrm{int}$")
@@ -82,15 +73,15 @@ def closure_laws(
 def _draw_laws(result: Any, laws: Any, key: bool, log: bool, units: Units | None, ax: Axes | None) -> Axes:
     """Draw the steps of each shear and both laws through them."""
     names = ("interface_closure", "nominal_pressure")
-    data = result_of(result, names, PATH, units)
+    data = result_of(result, names, _paths.PATH, units)
     fitted = result_of(laws, (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
     with Problems("fc.plotting") as problems:
         count, of_laws = data.sizes["shear"], fitted.sizes["shear"]
         problems.require(of_laws == count, "laws", f"{count} shears, as of the closure", of_laws)
-    panel = LinePanel.of(ax, data, *names, PATH, by_shear(data))
+    panel = LinePanel.of(ax, data, *names, _paths.PATH, _paths.by_shear(data))
     points, pressure = panel.x.values, panel.y.values
     if "seated_closure" in fitted:
-        points = table(fitted, "seated_closure", PATH)
+        points = table(fitted, "seated_closure", _paths.PATH)
     seat = float(fitted["seating_pressure"]) if "seating_pressure" in fitted else 0.0
     constants = [table(fitted, name, ("shear",)) for name in LAW_CONSTANTS]
     preferred = table(fitted, "preferred_law", ("shear",)).astype(int)
@@ -119,8 +110,8 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     The aperture is zero where contacts block the flow from side to side. Broad pale lines show the
     mechanical aperture (mean gap) if the result has it.
     """
-    data = result_of(result, ("hydraulic_aperture",), (*PATH, "axis"), units)
-    dims, x, family = path_axis(data, None)
+    data = result_of(result, ("hydraulic_aperture",), (*_paths.PATH, "axis"), units)
+    dims, x, family = _paths.path_axis(data, None)
     aperture = quantity(data, "hydraulic_aperture", ("axis", *dims))
     panel = LinePanel.of(ax, data, x, aperture, dims, family, points=_style.MAX_MARKED_POINTS)
     axes = words(data["axis"]) if "axis" in data.coords else []
@@ -207,14 +198,14 @@ def _state(data: xr.Dataset) -> str:
 def _of_joint(data: xr.Dataset) -> Any:
     """Draw the closure laws, with the steps marked whose maps `joint_contact_domains` shows."""
     every = data.expand_dims([dim for dim in ("shear", "step") if dim not in data.dims])
-    shear = middle_shear(data)
-    steps = loaded_steps(at_shear(every, shear), MAPS) if "state" in data else ()
+    shear = _paths.middle_shear(data)
+    steps = _paths.loaded_steps(_paths.at_shear(every, shear), MAPS) if "state" in data else ()
     return closure_laws(data, shear=shear, marked=steps)
 
 
 FIGURES = (
     StudyFigure("joint_closure", "joints/closure", "interface_closure", _of_joint),
-    StudyFigure("closure_law", "contact", "closure", by_decades(closure_laws)),
+    StudyFigure("closure_law", "contact", "closure", _paths.by_decades(closure_laws)),
     StudyFigure("hydraulic_aperture", "joints/transmissivity", "hydraulic_aperture", hydraulic_aperture),
-    StudyFigure("uplift", "joints/uplift", "uplift_profile", at_end(uplift, *PATH)),
+    StudyFigure("uplift", "joints/uplift", "uplift_profile", _paths.at_end(uplift, *_paths.PATH)),
 )

@@ -9,18 +9,9 @@ import xarray as xr
 
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
-from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import as_dataset, extent_of, require_known_dims, result_of, table
-from fractalcontact.plotting._paths import (
-    PATH,
-    at_end,
-    at_shear,
-    load_of,
-    middle_shear,
-    select_path,
-    shear_text,
-)
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Units, name_of
 
@@ -44,9 +35,9 @@ def contact_domains(
     """
     names = as_dataset(result).variables
     name = "slip_state" if "slip_state" in names else "state"
-    data = result_of(result, (name,), PATH, units)
-    require_known_dims(data, {name: (*PATH, "y", "x")})
-    path = select_path(data, shear, normal_force, panels)
+    data = result_of(result, (name,), _paths.PATH, units)
+    require_known_dims(data, {name: (*_paths.PATH, "y", "x")})
+    path = _paths.select_path(data, shear, normal_force, panels)
     state = path.states[name].transpose(path.dim, "y", "x")
     count, columns = len(state), _style.number_of_columns(len(state))
     width = _style.WIDTH * columns / _style.COLUMNS
@@ -225,10 +216,10 @@ def first_contact(
     Cells that never touch are pale. Where sets grow with load, the contact domain at a load is all cells up
     to its colour.
     """
-    data = result_of(result, ("state",), PATH, units)
-    require_known_dims(data, {"state": (*PATH, "y", "x")})
-    path = at_shear(data, shear)
-    name = load_of(path)
+    data = result_of(result, ("state",), _paths.PATH, units)
+    require_known_dims(data, {"state": (*_paths.PATH, "y", "x")})
+    path = _paths.at_shear(data, shear)
+    name = _paths.load_of(path)
     loads = table(path, name, ("step",)) if name else np.arange(path.sizes["step"], dtype=float)
     touching = path["state"].transpose("step", "y", "x").values > 0
     values = np.where(touching.any(axis=0), loads[np.argmax(touching, axis=0)], np.nan)
@@ -236,12 +227,10 @@ def first_contact(
     attributes = path[name].attrs if name else {"units": "1"}
     plane = xr.DataArray(values, coords, dims=("y", "x"), name=name or "step", attrs=attributes)
     ax = _style.axes_or_new(ax, _style.MAP)
-    title, log = (
-        f"{name_of(plane) if name else 'step'} of first contact",
-        _style.needs_log_axis(loads[loads > 0]),
-    )
+    title = f"{name_of(plane) if name else 'step'} of first contact"
+    log = _style.needs_log_axis(loads[loads > 0])
     _maps.draw_values(ax, plane, missing=_style.OPEN_COLOUR, name=title, log=log, clipped=0.0, readable=True)
-    ax.set_title(shear_text(path, data))
+    ax.set_title(_paths.shear_text(path, data))
     return ax
 
 
@@ -251,25 +240,26 @@ def _surface(data: xr.Dataset, delta: xr.Dataset | None = None) -> Any:
 
 def _delta_surface(data: xr.Dataset) -> Any:
     last = data.isel(shear=-1) if "shear" in data.dims else data
-    return surface(last, title=f"delta-surface, {shear_text(last)}".rstrip(", "))
+    return surface(last, title=f"delta-surface, {_paths.shear_text(last)}".rstrip(", "))
 
 
 def _along_load(data: xr.Dataset) -> Any:
-    return contact_domains(data, shear=middle_shear(data))
+    return contact_domains(data, shear=_paths.middle_shear(data))
 
 
 def _along_shear(data: xr.Dataset) -> Any:
     return contact_domains(data, normal_force=float(np.nanmax(data["normal_force"].values)))
 
 
+_last_domains = _paths.at_end(contact_domains, "shear")
 FIGURES = (
     StudyFigure("surface", "surfaces", "height", _surface, beside={"delta": "joints/delta_surface"}),
     StudyFigure("delta_surface", "joints/delta_surface", "height", _delta_surface),
     StudyFigure("joint_contact_domains", "joints/closure", "state", _along_load),
-    StudyFigure("joint_contact_domains_along_shear", "joints/closure", "state", _along_shear, PATH),
+    StudyFigure("joint_contact_domains_along_shear", "joints/closure", "state", _along_shear, _paths.PATH),
     StudyFigure("joint_first_contact", "joints/closure", "state", first_contact, ("step",)),
     StudyFigure("contact_domains", "contact", "state", contact_domains),
     StudyFigure("first_contact", "contact", "state", first_contact, ("step",)),
-    StudyFigure("slip_domains", "partial_slip", "slip_state", at_end(contact_domains, "shear")),
-    StudyFigure("joint_slip_domains", "joints/partial_slip", "slip_state", at_end(contact_domains, "shear")),
+    StudyFigure("slip_domains", "partial_slip", "slip_state", _last_domains),
+    StudyFigure("joint_slip_domains", "joints/partial_slip", "slip_state", _last_domains),
 )

@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.validation import Problems
-from fractalcontact.plotting import _maps, _style
+from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
     as_dataset,
@@ -21,7 +21,6 @@ from fractalcontact.plotting._inputs import (
     table,
 )
 from fractalcontact.plotting._line_panel import Family, LinePanel, ordered
-from fractalcontact.plotting._paths import PATH, at_shear, by_load, by_shear, load_of, path_axis, shear_text
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import PLAIN, Quantity, Units, name_of, number_texts, scale_of
 
@@ -105,7 +104,7 @@ def _masks_of(data: xr.Dataset) -> tuple[Family, list[Any]]:
     groups = [np.flatnonzero(group.ravel() == number) for number in range(group.max(initial=-1) + 1)]
     family = ordered((), count=len(groups))
     if len(names) == 1 and names[0] in ("shear", "step") and names[0] in data.coords:
-        every = (by_shear if names[0] == "shear" else by_load)(data)
+        every = (_paths.by_shear if names[0] == "shear" else _paths.by_load)(data)
         places = [nearest(data[names[0]], value) for value in columns[0][0]]
         family = ordered([every.labels[place] for place in places], every.name, every.unit)
     return family, groups
@@ -137,8 +136,8 @@ def evolution(
     number of islands | islands in a step
     """
     lost = "absorbed" if "absorbed" in as_dataset(result).variables else "merges"
-    data = result_of(result, ("n_islands", "births", lost), PATH, units)
-    dims, x, family = path_axis(data, against)
+    data = result_of(result, ("n_islands", "births", lost), _paths.PATH, units)
+    dims, x, family = _paths.path_axis(data, against)
     shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), sharex=True)
     names = (("n_islands", "number of islands"), ("births", "islands in a step"))
     left, right = (LinePanel.of(ax, data, x, y, dims, family, y_name=name, points=_style.MAX_MARKED_POINTS)
@@ -190,7 +189,7 @@ def alluvial(
     colour each, and so has every island that grows into one of them: a merge tree. The others are grey.
     """
     data = result_of(result, COLUMNS, ("shear",), units)
-    path = at_shear(data, shear)
+    path = _paths.at_shear(data, shear)
     with Problems("fc.plotting") as problems:
         for name in COLUMNS:
             problems.require(path[name].dims == ("link",), f"result.{name}", "the dim link", path[name].dims)
@@ -203,7 +202,7 @@ def alluvial(
     stacks = _stacks(links)
     _draw_stacks(ax, links, stacks)
     texts = [str(place) for place in range(len(stacks))]
-    name = load_of(path) if "step" in path.dims else ""
+    name = _paths.load_of(path) if "step" in path.dims else ""
     if name:
         scale = scale_of(path[name])
         texts = number_texts(scale, table(path, name, ("step",)), 3)
@@ -211,7 +210,7 @@ def alluvial(
     distance = max(1, -(-len(stacks) // _style.MAX_LEGEND_ENTRIES))
     shown = slice((len(stacks) - 1) % distance, None, distance)  # the last one always
     ax.set_xticks(range(len(stacks))[shown], texts[shown])
-    ax.set_title(shear_text(path, data))
+    ax.set_title(_paths.shear_text(path, data))
     ax.autoscale_view()
     ax.set_ylim(bottom=0)
     ax.grid(False)
@@ -256,10 +255,9 @@ def _stacks(links: list[xr.Dataset]) -> list[Stack]:
     for each in links[::-1]:
         cells = _sizes(each, "before")
         colour = np.full(cells.size, LARGEST)
-        heir = np.flatnonzero(each["common_cells"].values > 0)
-        heir = heir[
-            np.argsort(each["common_cells"].values[heir])
-        ]  # the largest overlap comes last, and stays
+        shared = each["common_cells"].values
+        heir = np.flatnonzero(shared > 0)
+        heir = heir[np.argsort(shared[heir])]  # the largest overlap comes last, and stays
         before, after = (each[f"island_{side}"].values[heir] - 1 for side in ("before", "after"))
         colour[before] = stacks[0].colour[after]
         stacks.insert(0, Stack.of(cells, colour))
