@@ -234,9 +234,8 @@ def draw(
         problems.boolean("progress", progress)
         expected, are_units = UNITS_EXPECTED
         problems.require(units is None or are_units(units), "units", expected, units)
-        if problems.require(
-            isinstance(formats, (list, tuple)) and bool(formats), "formats", "a sequence of words", formats
-        ):
+        are_several = isinstance(formats, (list, tuple)) and bool(formats)
+        if problems.require(are_several, "formats", "a sequence of words", formats):
             for word in formats:
                 problems.choice("formats", word, FORMATS)
     if units is not None:

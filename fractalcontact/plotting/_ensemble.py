@@ -38,21 +38,18 @@ def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
         return dataset
     loads = [name for name, coord in dataset.coords.items() if MEMBER in coord.dims and name != MEMBER]
     flat = dataset.reset_coords(loads)
-    reduced = {}
-    for name, variable in flat.data_vars.items():
-        is_map = {"y", "x"} <= set(variable.dims) or variable.dtype.kind not in "fiu"
-        if MEMBER not in variable.dims:
-            reduced[name] = variable
-        elif is_map or variable.dtype == np.int8:
-            reduced[name] = variable.isel({MEMBER: 0}, drop=True)
-        else:
-            with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
-                values = np.nanquantile(variable.values.astype(float), share, variable.dims.index(MEMBER))
-            first = variable.isel({MEMBER: 0}, drop=True)
-            reduced[name] = first.copy(data=values)
-    rest = flat.drop_dims(MEMBER)
-    return rest.assign(reduced).set_coords(loads)
+    curves = [name for name, variable in flat.data_vars.items() if _is_curve(variable)]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
+        reduced = flat[curves].quantile(share, MEMBER, keep_attrs=True).data_vars
+    first = flat.isel({MEMBER: 0}, drop=True).assign(reduced)
+    return first.drop_vars("quantile", errors="ignore").set_coords(loads)
+
+
+def _is_curve(variable: xr.DataArray) -> bool:
+    """Return whether a variable has numbers, not flags, of each member, and is no map."""
+    has_numbers = variable.dtype.kind in "fiu" and variable.dtype != np.int8
+    return has_numbers and MEMBER in variable.dims and not {"y", "x"} <= set(variable.dims)
 
 
 def draw_with_band(drawings: Sequence[Callable[[], Any]], members: int) -> Axes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, ParamSpec, TypeAlias, TypeVar
 
@@ -108,17 +107,13 @@ def _are_panels(value: Any) -> bool:
     return _is_sheet(value) or (several and all(map(_is_axes, np.ravel(np.asarray(value, dtype=object)))))
 
 
-def _is_number(value: Any) -> bool:
-    # a labelled number would carry its dims into the figure
-    try:
-        return is_real(value) and math.isfinite(value)
-    except OverflowError:  # an integer beyond any double
-        return False
-
-
 def _are_numbers(value: Any) -> bool:
     values = real_numbers(value) if isinstance(value, (list, tuple, np.ndarray)) else None
     return values is not None and np.ndim(value) == 1 and bool(np.isfinite(values).all())
+
+
+def _is_number(value: Any) -> bool:
+    return is_real(value) and _are_numbers([value])  # a labelled number would carry its dims into the figure
 
 
 def _are_words(value: Any) -> bool:

@@ -48,15 +48,11 @@ def result_of(
     dataset = shown_in(as_dataset(data, argument), units)
     require_variables(dataset, names, argument)
     with Problems("fc.plotting") as problems:
-        extra = [
-            dim
-            for dim in dataset.dims
-            if dim in PATH_DIMS and dim not in dims and any(dim in dataset[name].dims for name in names)
-        ]
+        own = {dim for name in names for dim in dataset[name].dims}
+        extra = [dim for dim in dataset.dims if dim in PATH_DIMS and dim not in dims and dim in own]
         for dim in extra:
-            problems.require(
-                dataset.sizes[dim] == 1, argument, f"one {dim}; choose with .sel or .isel", dataset.sizes[dim]
-            )
+            size = dataset.sizes[dim]
+            problems.require(size == 1, argument, f"one {dim}; choose with .sel or .isel", size)
         for dim in (dim for dim in dims if dim in dataset.variables and dim not in dataset.dims):
             over = dataset[dim].dims  # a variable of this name, as the shear of `direct_shear` over points
             problems.require(not over, argument, f"a result over {dim}", f"one with {dim} over {over}")
@@ -69,12 +65,8 @@ def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
     if isinstance(data, xr.DataTree):
         data = data.to_dataset()
     if isinstance(data, xr.DataArray):
-        is_own = data.name in data.coords
-        data = (
-            data.coords.to_dataset()
-            if is_own
-            else data.rename("height" if data.name in (None, "") else data.name).to_dataset()
-        )
+        name = "height" if data.name in (None, "") else data.name
+        data = data.coords.to_dataset() if name in data.coords else data.rename(name).to_dataset()
     with Problems("fc.plotting") as problems:
         expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
         if problems.require(isinstance(data, xr.Dataset), argument, expected, type(data).__name__):
@@ -90,10 +82,9 @@ def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
 def require_variables(dataset: xr.Dataset, names: Sequence[str], argument: str = "result") -> None:
     """Raise InvalidInput unless the variables are present."""
     with Problems("fc.plotting") as problems:
+        known = list(dataset.variables)
         for name in names:
-            problems.require(
-                name in dataset.variables, argument, f"the variable {name!r}", list(dataset.variables)
-            )
+            problems.require(name in known, argument, f"the variable {name!r}", known)
 
 
 def require_dims(dataset: xr.Dataset, dims: Mapping[str, str]) -> None:
@@ -120,10 +111,8 @@ def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     with Problems("fc.plotting") as problems:
         for dim, size in others.items():
             problems.require(size == 1, f"result.{name}", f"one {dim}; choose with .sel or .isel", size)
-    variable = variable.isel(dict.fromkeys(others, 0))
-    for dim in dims:
-        if dim not in variable.dims:
-            variable = variable.expand_dims({dim: data.sizes[dim]})
+    repeated = {dim: data.sizes[dim] for dim in dims if dim not in variable.dims}
+    variable = variable.isel(dict.fromkeys(others, 0)).expand_dims(repeated)
     return np.asarray(variable.transpose(*dims).values, dtype=np.float64)
 
 
