@@ -86,30 +86,17 @@ def _fewest_boxes(
 
     The bands are those of `_bands` for the rows and for the columns.
     """
-    nx, offsets = cells.shape[1], int(row_bands[:, 4].max()) + 1
+    offsets = int(row_bands[:, 4].max()) + 1
     # ascending, so that the column sums of a band follow from those of the band before it
     row_bands = row_bands[np.lexsort((row_bands[:, 1], row_bands[:, 0]))]
     is_full = column_bands[:, 1] - column_bands[:, 0] == size
     count, area = np.zeros((offsets, size), np.int32), np.zeros((offsets, size), np.int64)
-    summed_rows = np.zeros((2, 2), np.int64)
-    columns = np.zeros((3, nx), np.int32)
-    prefix = np.zeros((2, nx + 1 + (2 * size if wrap_x else 0)), np.int32)
+    beyond = 2 * size if wrap_x else 0
     positions = int(is_full.sum())
     fold = size * max(1, -(-min(positions, folded) // size))  # of a whole number of boxes
     met, lost = np.zeros((2, offsets, fold), np.int32)
     count_boxes_in_bands(
-        cells,
-        size,
-        row_bands,
-        column_bands[~is_full],
-        positions,
-        summed_rows,
-        columns,
-        prefix,
-        met,
-        lost,
-        count,
-        area,
+        cells, size, row_bands, column_bands[~is_full], positions, beyond, met, lost, count, area
     )
     fewest, least = [], []
     step = max(1, added // fold)
@@ -167,11 +154,9 @@ def _positions_that_meet(cells: Array, largest: int, periodic: Sequence[bool]) -
     """
     ny, nx = cells.shape
     ahead = [(0, largest if wraps and n > 1 else 0) for n, wraps in zip(cells.shape, periodic, strict=True)]
-    distance = np.full(nx + ahead[1][1] + 1, largest + 1, np.int32)
-    histogram = np.zeros(largest + 2, np.int64)
     continued = np.pad(cells, ahead, mode="wrap") if np.any(ahead) else cells
-    nearest_ahead(continued, ny, nx, distance, histogram)
-    every = np.cumsum(histogram)[: largest + 1]  # with the boxes that hang over the far edges
+    # with the boxes that hang over the far edges
+    every = np.cumsum(nearest_ahead(continued, ny, nx, largest))[:-1]
     folded = every.copy()
     free = {axis: _from_edges(cells, axis, largest) for axis in (0, 1) if not periodic[axis]}
     for axis, (low, high) in free.items():
@@ -246,9 +231,7 @@ def count_boxes_in_bands(
     rows: Array,
     cut: Array,
     positions: int,
-    summed_rows: Array,
-    columns: Array,
-    prefix: Array,
+    beyond: int,
     met: Array,
     lost: Array,
     count: Array,
@@ -261,14 +244,15 @@ def count_boxes_in_bands(
     columns, one at each of `positions`, by their position modulo that multiple, the boxes met, and the rows
     that those of them lose that count by their part inside; `count` and `area`
     (size, size) the boxes cut in x and their area in cells. All sums are integers, so that no result depends
-    on their order.
-
-    The others are zeros to work in, for the band and, where it is cut in y, for it with its neighbours:
-    `summed_rows` (2, 2) the range of rows in `columns`, `columns` (3, nx) the cells of the set in each column
-    (and, last, none), `prefix` (2, at least nx + 1) how many columns left of each position hold any, or hold
-    more than in the band; it continues periodically where it is longer.
+    on their order. A periodic x is continued by `beyond` columns.
     """
     ny, nx = mask.shape
+    # of the band and, where it is cut in y, of it with its neighbours: the range of rows that are summed,
+    # their cells of the set in each column (and, last, none), and how many columns left of each position
+    # hold any, or hold more than in the band
+    summed_rows = np.zeros((2, 2), np.int64)
+    columns = np.zeros((3, nx), np.int32)
+    prefix = np.zeros((2, nx + 1 + beyond), np.int32)
     ahead = np.uint32(size)  # unsigned: no test for negative indices
     for k in range(rows.shape[0]):
         first, end, offset = rows[k, 0], rows[k, 1], rows[k, 4]
@@ -312,15 +296,16 @@ def count_boxes_in_bands(
 
 
 @kernel
-def nearest_ahead(cells: Array, rows: int, columns: int, distance: Array, histogram: Array) -> None:
+def nearest_ahead(cells: Array, rows: int, columns: int, largest: int) -> Array:
     """Count the positions in the first `rows` and `columns` by the size from which on a box meets the set.
 
     A box at (i, j) of size s meets the set if s >= d(i, j), where d is one on the set and elsewhere one more
     than the smallest d of the three neighbours ahead: a one-sided chessboard distance. Beyond an edge the set
-    is empty; a periodic axis is continued for the longest box. `distance` (nx + 1) int32 holds largest + 1
-    everywhere, `histogram` (largest + 2) zeros.
+    is empty; a periodic axis is continued for the `largest` box. Of the counts, (largest + 2), the last is
+    of positions where no box does.
     """
     nx = cells.shape[1]
+    distance, histogram = np.full(nx + 1, largest + 1, np.int32), np.zeros(largest + 2, np.int64)
     far = distance[nx]
     for i in range(cells.shape[0] - 1, -1, -1):
         beyond, corner = far, far  # values at j + 1, in this row and in the row below
@@ -334,3 +319,4 @@ def nearest_ahead(cells: Array, rows: int, columns: int, distance: Array, histog
         if i < rows:
             for j in range(columns):
                 histogram[distance[j] if distance[j] < far else far] += 1
+    return histogram

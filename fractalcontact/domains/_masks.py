@@ -322,18 +322,12 @@ def read_planes(
 
 def _flags(mask: xr.DataArray) -> Array:
     """Return where the mask is set, as a C-ordered array; a chunked mask is read chunk by chunk."""
-    if not has_blocks(mask):
-        values = np.ascontiguousarray(mask.values)
-        return values if values.dtype.kind == "b" else np.asarray(values > 0)
-    flags, chunks = np.empty(mask.shape, bool), mask.chunks or ()
-    stops = [np.cumsum(lengths) for lengths in chunks]
-    for block in np.ndindex(*(len(lengths) for lengths in chunks)):
-        region = tuple(
-            slice(int(stop[k]) - lengths[k], int(stop[k]))
-            for stop, lengths, k in zip(stops, chunks, block, strict=True)
-        )
-        np.greater(mask[region].values, 0, out=flags[region])
-    return flags
+    if has_blocks(mask):
+        flags = np.empty(mask.shape, bool)
+        (mask.data > 0).store(flags)
+        return flags
+    values = np.ascontiguousarray(mask.values)
+    return values if values.dtype.kind == "b" else np.asarray(values > 0)
 
 
 def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:

@@ -131,7 +131,8 @@ def _count_offsets(
     """
     is_short = max(reach) < np.iinfo(np.int16).max
     above, below = np.empty((2, *cells.shape), np.int16 if is_short else np.int32)
-    rows_to_set(cells, reach[0], periodic[0], above, below)
+    for distance, is_backward in ((above, False), (below, True)):
+        rows_to_set(cells, reach[0], periodic[0], is_backward, distance)
     observed = np.broadcast_to(np.uint8(1), cells.shape) if valid is None else valid
     # in squares of the shorter spacing, rounded: equal distances are then equal in any unit; 4 and 9 decimals
     # gave the same bits
@@ -160,28 +161,21 @@ def null_area(cells: float, observed: float, grid: Grid, radii: Array) -> Array:
 
 
 @kernel
-def rows_to_set(cells: Array, reach: int, wrap: bool, above: Array, below: Array) -> None:
-    """Find the rows to the nearest cell of the set in each column, up and down; reach + 1 beyond the reach.
+def rows_to_set(cells: Array, reach: int, wrap: bool, is_backward: bool, distance: Array) -> None:
+    """Find the rows up, or backward down, to the nearest cell of the set in each column; reach + 1 beyond.
 
     `cells` is uint8 (0 or 1), shape (ny, nx); `wrap` marks a periodic y.
     """
     ny, nx = cells.shape
     far = reach + 1
-    over = reach if wrap else 0
-    last = np.full(nx, far, above.dtype)
-    for i in range(-over, ny):
+    last = np.full(nx, far, distance.dtype)
+    for k in range(-reach if wrap else 0, ny):
+        i = ny - 1 - k if is_backward else k
         row = cells[i % ny]
         for j in range(nx):
             last[j] = 0 if row[j] else min(last[j] + 1, far)
-        if i >= 0:
-            above[i] = last
-    last[:] = far
-    for i in range(ny + over - 1, -1, -1):
-        row = cells[i % ny]
-        for j in range(nx):
-            last[j] = 0 if row[j] else min(last[j] + 1, far)
-        if i < ny:
-            below[i] = last
+        if k >= 0:
+            distance[i] = last
 
 
 @kernel

@@ -158,8 +158,7 @@ def drift_of(slopes: tuple[Array, Array]) -> float:
     x, y = slopes
     if x.size < 3:
         return 0.0
-    centred = x - x.mean()
-    return float(abs(centred @ (y - y.mean())) / (centred @ centred) * np.ptp(x))
+    return float(abs(fit_line(x, y)[0]) * np.ptp(x))
 
 
 def steadiest_window(

@@ -163,11 +163,11 @@ def analyse(
     flags, reasons = _flags(
         planes, gap[:, 0], islands, median, np.fmax(low, start), has_window=bool(np.isfinite(low))
     )
-    in_window = _window_quantities(planes, spots, np.array([low, high]), scales)
+    in_window, plain = _window_quantities(planes, spots, np.array([low, high]), scales)
     pairs = planes.map(lambda *plane: pair_correlation_length(planes, plane[-1]), range(planes.count))
     quantities = {"spot_size": spot, "gap_size": gap, "pair_correlation_length": np.array(pairs)}
-    quantities |= in_window.replicates
-    _withhold(quantities, in_window, flags)
+    quantities |= in_window
+    _withhold(quantities, plain, flags)
 
     variables: dict[str, Any] = {
         "coverage": planes.variable(coverage),
@@ -181,7 +181,7 @@ def analyse(
         "window_low": ((), low),
         "window_high": ((), high),
     }
-    for name, values in in_window.plain.items():
+    for name, values in plain.items():
         variables[name] = planes.variable(values)
     for name, replicates in quantities.items():
         variables |= _with_interval(planes, name, replicates)
@@ -265,14 +265,6 @@ class RandomSpots:
             )
 
 
-@dataclass(frozen=True)
-class WindowQuantities:
-    """What depends on the window: replicates (planes, 1 + blocks, ...), and values without an interval."""
-
-    replicates: dict[str, Array]
-    plain: dict[str, Array]
-
-
 def _window_quantities(
     planes: Planes,
     spots: RandomSpots,
@@ -280,8 +272,11 @@ def _window_quantities(
     scales: Array,
     *,
     sizes: int = 9,  # in a window of ratio 4 at a ratio of 1.19, so that local slopes still differ
-) -> WindowQuantities:
-    """Return dimension, excess, clustering and lacunarity over the window and at its three scales."""
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return dimension, excess, clustering and lacunarity over the window and at its three scales.
+
+    First those with replicates (planes, 1 + blocks, ...), then the values without an interval.
+    """
     grid = planes.grid
     low, high = window if np.isfinite(window).all() else scales[[0, -1]]
     fitted = np.geomspace(low, high, sizes)
@@ -313,7 +308,7 @@ def _window_quantities(
         "local_dimension_min": local.min(-1),
         "local_dimension_max": local.max(-1),
     }
-    return WindowQuantities(replicates, plain)
+    return replicates, plain
 
 
 @dataclass(frozen=True)
@@ -422,12 +417,12 @@ def _flags(
     return np.array(flags, np.int8), np.array(reasons, str)
 
 
-def _withhold(quantities: dict[str, Array], in_window: WindowQuantities, flags: Array) -> None:
+def _withhold(quantities: dict[str, Array], plain: dict[str, Array], flags: Array) -> None:
     """Set to NaN, in place, what the flag of a state does not allow to be given as a number."""
     flagged = flags > 0
     for name in ("domain_dimension", "excess_dimension"):
         quantities[name][flagged] = np.nan
-    for values in in_window.plain.values():
+    for values in plain.values():
         values[flagged] = np.nan
     without_scale = np.isin(flags, [FLAGS.index(name) for name in ("empty", "full", "no_window")])
     for name in AT_SCALES:
@@ -457,17 +452,14 @@ def _changes(planes: Planes, quantities: dict[str, Array], along: str) -> dict[s
     result: dict[str, Any] = {}
     for name, change in CHANGES.items():
         states = quantities[name].reshape(planes.shape + quantities[name].shape[1:])
-        later, earlier = (np.take(states, ks, axis) for ks in _neighbours(planes.shape[axis]))
+        last = planes.shape[axis] - 1
+        later, earlier = (np.take(states, np.arange(last) + step, axis) for step in (1, 0))
         with np.errstate(divide="ignore", invalid="ignore"):
             difference = later / earlier if change.endswith("_ratio") else later - earlier
         first = np.full_like(np.take(states, [0], axis), np.nan)
         difference = np.concatenate([first, difference], axis).reshape(quantities[name].shape)
         result |= _with_interval(planes, change, difference)
     return result
-
-
-def _neighbours(count: int) -> tuple[Array, Array]:
-    return np.arange(1, count), np.arange(count - 1)
 
 
 def _notes(low: float, high: float) -> dict[str, dict[str, str]]:
