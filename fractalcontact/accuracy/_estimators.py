@@ -260,7 +260,20 @@ def _surfaces(
     if not family.is_free:
         return family.make(hurst, n, 0, count, stream)
     margin = int(np.ceil(5.0 * defects["blur"]))  # the Gaussian filter of SciPy ends at 4 spreads
-    return _with_defects(family.make(hurst, n, margin, count, stream), n, margin, defects, stream)
+    result = family.make(hurst, n, margin, count, stream)
+    if margin:
+        spread = (0.0, *[defects["blur"]] * (result.ndim - 1))
+        result = result.copy(data=gaussian_filter(result.values, spread))
+    result = result.isel({axis: slice(margin, margin + n) for axis in result.dims[1:]})
+    if defects["noise"]:
+        scatter = stream.standard_normal(result.shape)
+        result = result + defects["noise"] * HEIGHT * scatter
+    if defects["marks"]:
+        azimuth = 0.5  # radian: oblique to both axes
+        along = np.cos(azimuth) * result.x + (np.sin(azimuth) * result.y if "y" in result.dims else 0.0)
+        waves = np.cos(2.0 * np.pi / 7.0 / SPACING * along).transpose(*result.dims[1:])  # 7 spacings long
+        result = result + defects["marks"] * HEIGHT * waves
+    return result
 
 
 def matern(shape: tuple[int, ...], hurst: float, corner: float, count: int, stream: Stream) -> Array:
@@ -280,26 +293,6 @@ def matern(shape: tuple[int, ...], hurst: float, corner: float, count: int, stre
     for heights in result:
         whole = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
         heights[...] = whole[: shape[0], : shape[1]]
-    return result
-
-
-def _with_defects(
-    surface: xr.DataArray, n: int, margin: int, defects: dict[str, float], stream: Stream
-) -> xr.DataArray:
-    """Blur surfaces, remove their margin, and add noise and marks."""
-    result = surface
-    if margin:
-        spread = (0.0, *[defects["blur"]] * (result.ndim - 1))
-        result = result.copy(data=gaussian_filter(result.values, spread))
-    result = result.isel({axis: slice(margin, margin + n) for axis in result.dims[1:]})
-    if defects["noise"]:
-        scatter = stream.standard_normal(result.shape)
-        result = result + defects["noise"] * HEIGHT * scatter
-    if defects["marks"]:
-        azimuth = 0.5  # radian: oblique to both axes
-        along = np.cos(azimuth) * result.x + (np.sin(azimuth) * result.y if "y" in result.dims else 0.0)
-        waves = np.cos(2.0 * np.pi / 7.0 / SPACING * along).transpose(*result.dims[1:])  # 7 spacings long
-        result = result + defects["marks"] * HEIGHT * waves
     return result
 
 

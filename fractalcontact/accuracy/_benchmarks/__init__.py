@@ -70,6 +70,17 @@ def largest_error(exact: Any, *, relative: bool = False) -> Callable[[Any, float
     return error
 
 
+def value_of(
+    function: Callable[..., Any], variable: str, at: dict[str, Any] | None = None, **options: Any
+) -> Callable[[Any], Array]:
+    """Return the function of an input for a variable of the result of `function`, where `at` selects it."""
+
+    def solve(problem: Any) -> Array:
+        return np.asarray(function(problem, **options)[variable].sel(at or {}).squeeze())
+
+    return solve
+
+
 @dataclass(frozen=True)
 class Method:
     """One method, to be measured at several values of its parameter.

@@ -18,6 +18,7 @@ from fractalcontact.accuracy._benchmarks import (
     Benchmark,
     Method,
     largest_error,
+    value_of,
 )
 
 MODULUS, RADIUS, APPROACH = 1e9, 1.0, 1e-4  # the sphere of Hertz: Pa, m, m
@@ -39,9 +40,10 @@ def _sphere_benchmark() -> Benchmark:
         "fast, disc of equal area": (SIZES, {"influence": "disc", "disc_radius": "equal_area"}),
         "fast, square": (SIZES, {"influence": "square"}),
     }
+    pressed: dict[str, Any] = {"contact_modulus": MODULUS, "closure": APPROACH, "keep": ()}
     error = largest_error(4.0 / 3.0 * MODULUS * np.sqrt(RADIUS) * APPROACH**1.5, relative=True)
     methods = tuple(
-        Method(name, sizes, _sphere, partial(_press_sphere, options), error)
+        Method(name, sizes, _sphere, value_of(contact.press, "normal_force", **pressed, **options), error)
         for name, (sizes, options) in solvers.items()
     )
     return Benchmark("sphere", "relative error of the force", "Hertz: 4/3 E* sqrt(R) d^1.5", methods)
@@ -55,19 +57,16 @@ def _sphere(n: float) -> xr.DataArray:
     return surfaces.from_array(-(x**2 + x[:, None] ** 2) / (2.0 * RADIUS), 4.0 * contact_radius / n)
 
 
-def _press_sphere(options: dict[str, Any], surface: xr.DataArray) -> float:
-    pressed = contact.press(surface, contact_modulus=MODULUS, closure=APPROACH, keep=(), **options)
-    return float(pressed["normal_force"][0])
-
-
 def _wave_benchmark() -> Benchmark:
     angle = np.arcsin(np.sqrt(0.5))
+    pressure = 0.5 * np.pi * MODULUS  # half of that of full contact, for amplitude and wavelength 1
+    solve = value_of(contact.press, "mean_gap", contact_modulus=MODULUS, nominal_pressure=pressure, keep=())
     exact = 2.0 * (0.5 * np.cos(angle) ** 2 + np.sin(angle) ** 2 * np.log(np.sin(angle)))
     return Benchmark(
         "wave",
         "error of the mean gap over the amplitude",
         "Westergaard: the mean gap of a sinusoidal surface",
-        (Method("fast, spectral", SIZES, _wave, _press_wave, largest_error(exact)),),
+        (Method("fast, spectral", SIZES, _wave, solve, largest_error(exact)),),
     )
 
 
@@ -75,12 +74,6 @@ def _wave(n: float) -> xr.DataArray:
     x = np.arange(int(n)) / n
     heights = np.broadcast_to(np.cos(2.0 * np.pi * x), (int(n), int(n)))
     return surfaces.from_array(heights, 1.0 / n, periodic=True)
-
-
-def _press_wave(surface: xr.DataArray) -> float:
-    pressure = 0.5 * np.pi * MODULUS  # half of that of full contact, for amplitude and wavelength 1
-    pressed = contact.press(surface, contact_modulus=MODULUS, nominal_pressure=pressure, keep=())
-    return float(pressed["mean_gap"][0])
 
 
 def _rough_benchmarks() -> tuple[Benchmark, ...]:

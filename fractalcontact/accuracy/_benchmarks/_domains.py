@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact import domains, surfaces
-from fractalcontact.accuracy._benchmarks import Array, Benchmark, Method, largest_error
+from fractalcontact.accuracy._benchmarks import Array, Benchmark, Method, largest_error, value_of
 
 # an octave each
 SIZES = (64, 128, 256, 512, 1024)
@@ -27,25 +27,69 @@ CARPET = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 
 def benchmarks() -> tuple[Benchmark, ...]:
     """Return the benchmarks of the domain measures."""
+    sierpinski = largest_error(np.log(8) / np.log(3))
+    on_carpet = {
+        "box dimension, minimum cover": value_of(domains.box_dimension, "box_dimension", cover="minimum"),
+        "box dimension, mean cover": value_of(domains.box_dimension, "box_dimension", cover="mean"),
+        "correlation dimension": value_of(domains.correlation_dimension, "correlation_dimension"),
+        "Minkowski dimension": value_of(domains.minkowski_dimension, "minkowski_dimension"),
+    }
+    boundary = value_of(domains.boundary_dimension, "boundary_dimension")
+    boxes = value_of(domains.box_dimension, "box_dimension")
+    cascade = value_of(domains.generalised_dimensions, "generalised_dimension", q=ORDERS)
     moments = np.array([np.log2(np.sum(WEIGHTS**q)) / (1.0 - q) for q in ORDERS])
-    density = largest_error(lambda n: PER_CELL + EXCESS / n**2, relative=True)
-    carpet, resolutions = _carpet_benchmarks()
+    islands = value_of(domains.islands, "n_islands", periodic=True, keep=())
+    density = largest_error(lambda n: PER_CELL * n**2 + EXCESS, relative=True)
     return (
-        carpet,
-        _boundary_benchmark(),
-        _lacunarity_benchmark(),
+        Benchmark(
+            "carpet of Sierpinski, cut",
+            "error of the dimension",
+            "log 8 / log 3; the cut fits no grid of boxes",
+            tuple(Method(name, SIZES, _carpet, solve, sierpinski) for name, solve in on_carpet.items()),
+            equal_parameters=True,
+        ),
+        Benchmark(
+            "boundary of a level set",
+            f"root mean square error of the dimension over {REPLICATES} surfaces",
+            f"2 - H for an exact fractional Brownian surface, H = {HURST}",
+            (
+                _random_method("boundary dimension", _level_set, boundary, 2.0 - HURST),
+                _random_method("box dimension of the boundary cells", _boundary_cells, boxes, 2.0 - HURST),
+            ),
+            equal_parameters=True,
+        ),
+        Benchmark(
+            "independent cells",
+            f"root mean square relative error of the lacunarity less one, over {REPLICATES} masks",
+            f"(1 - p)/(p r^2) for independent cells, p = {COVERAGE}, boxes of {BOX}",
+            tuple(_lacunarity_method(boxes) for boxes in ("gliding", "fixed")),
+            equal_parameters=True,
+        ),
         Benchmark(
             "multiplicative cascade",
             "largest error of D_q at q = 0, 2, 3",
             "log2 of the sum of the four weights to the power q, over 1 - q",
-            (Method("generalised dimensions", SIZES, _cascade, _moments, largest_error(moments)),),
+            (Method("generalised dimensions", SIZES, _cascade, cascade, largest_error(moments)),),
         ),
-        resolutions,
+        Benchmark(
+            "carpet of Sierpinski at three resolutions",
+            "error of the dimension",
+            "log 8 / log 3",
+            (
+                Method(
+                    "area dimension",
+                    (27, 81, 243, 729),  # powers of 3, on which the carpet is whole
+                    _resolutions,
+                    value_of(domains.area_dimension, "area_dimension"),
+                    sierpinski,
+                ),
+            ),
+        ),
         Benchmark(
             "number of islands at the critical coverage",
             "relative error of the islands for each cell, one periodic mask",
             f"{PER_CELL} + {EXCESS}/n^2 (Ziff, Finch and Adamchik 1997); the random scatter is about 1/n",
-            (Method("islands", SIZES, _critical, _island_density, density),),
+            (Method("islands", SIZES, _critical, islands, density),),
             equal_parameters=True,
         ),
         Benchmark(
@@ -62,45 +106,29 @@ def _mask(values: Any) -> xr.DataArray:
     return xr.DataArray(np.asarray(values, bool), dims=("y", "x"))
 
 
-def _number(function: str, options: dict[str, Any], mask: xr.DataArray) -> float:
-    """Return the result of a function whose main variable has its name."""
-    return float(getattr(domains, function)(mask, **options)[function].squeeze())
-
-
-def _replicates(
+def _random_method(
+    name: str,
     make: Callable[[float, int], xr.DataArray],
-    solve: Callable[[xr.DataArray], float],
+    solve: Callable[[xr.DataArray], Array],
     truth: float,
     scale: float = 1.0,
-) -> Callable[[Any, float], Array]:
-    """Return a function for the errors of a measure, over `scale`, on independent masks of one size."""
+) -> Method:
+    """Return a method with the errors of a measure, over `scale`, on independent masks of one size."""
 
     def errors(_: Any, n: float) -> Array:
         return np.array([solve(make(n, seed)) for seed in range(REPLICATES)]) / scale - truth / scale
 
-    return errors
+    return Method(name, SIZES, lambda n: make(n, 0), solve, errors)
 
 
-def _carpet_benchmarks() -> tuple[Benchmark, Benchmark]:
-    measures: dict[str, tuple[str, dict[str, Any]]] = {
-        "box dimension, minimum cover": ("box_dimension", {"cover": "minimum"}),
-        "box dimension, mean cover": ("box_dimension", {"cover": "mean"}),
-        "correlation dimension": ("correlation_dimension", {}),
-        "Minkowski dimension": ("minkowski_dimension", {}),
-    }
-    meaning, truth = "error of the dimension", "log 8 / log 3"
-    error = largest_error(np.log(8) / np.log(3))
-    methods = tuple(
-        Method(name, SIZES, _carpet, partial(_number, function, options), error)
-        for name, (function, options) in measures.items()
-    )
-    # powers of 3, on which the carpet is whole
-    area = Method("area dimension", (27, 81, 243, 729), _resolutions, _area_dimension, error)
-    no_grid = f"{truth}; the cut fits no grid of boxes"
-    return (
-        Benchmark("carpet of Sierpinski, cut", meaning, no_grid, methods, True),
-        Benchmark("carpet of Sierpinski at three resolutions", meaning, truth, (area,)),
-    )
+def _lacunarity_method(boxes: str) -> Method:
+    exact = 1.0 + (1.0 - COVERAGE) / (COVERAGE * BOX**2)
+    solve = value_of(domains.lacunarity, "lacunarity", box_sizes=[BOX], boxes=boxes, periodic=False)
+    return _random_method(f"lacunarity, {boxes} boxes", _independent_cells, solve, exact, exact - 1.0)
+
+
+def _stream(n: float, seed: int) -> np.random.Generator:
+    return np.random.default_rng(int(n) if seed == 0 else (int(n), seed))
 
 
 @lru_cache(maxsize=8)  # the sizes of a benchmark
@@ -111,43 +139,14 @@ def _carpet(n: float) -> xr.DataArray:
     return _mask(mask[: int(n), : int(n)])
 
 
-def _boundary_benchmark() -> Benchmark:
-    boundary = partial(_number, "boundary_dimension", {})
-    boxes = partial(_number, "box_dimension", {})
-    dimension = 2.0 - HURST
-    return Benchmark(
-        "boundary of a level set",
-        f"root mean square error of the dimension over {REPLICATES} surfaces",
-        f"2 - H for an exact fractional Brownian surface, H = {HURST}",
-        (
-            Method(
-                "boundary dimension",
-                SIZES,
-                _level_set,
-                boundary,
-                _replicates(_level_set, boundary, dimension),
-            ),
-            Method(
-                "box dimension of the boundary cells",
-                SIZES,
-                _boundary_cells,
-                boxes,
-                _replicates(_boundary_cells, boxes, dimension),
-            ),
-        ),
-        True,
-    )
-
-
 @lru_cache(maxsize=2 * REPLICATES)
-def _level_set(n: float, seed: int = 0) -> xr.DataArray:
-    rng = int(n) if seed == 0 else (int(n), seed)
-    stream = np.random.default_rng(rng)
-    heights = surfaces.fbm((int(n), int(n)), 1.0, hurst=HURST, rms_increment=1.0, rng=stream).values
+def _level_set(n: float, seed: int) -> xr.DataArray:
+    size = (int(n), int(n))
+    heights = surfaces.fbm(size, 1.0, hurst=HURST, rms_increment=1.0, rng=_stream(n, seed)).values
     return _mask(heights > np.median(heights))
 
 
-def _boundary_cells(n: float, seed: int = 0) -> xr.DataArray:
+def _boundary_cells(n: float, seed: int) -> xr.DataArray:
     inside = _level_set(n, seed).values
     edge = np.zeros_like(inside)
     edge[:, :-1] |= inside[:, 1:] != inside[:, :-1]
@@ -155,29 +154,8 @@ def _boundary_cells(n: float, seed: int = 0) -> xr.DataArray:
     return _mask(edge)
 
 
-def _lacunarity_benchmark() -> Benchmark:
-    exact = 1.0 + (1.0 - COVERAGE) / (COVERAGE * BOX**2)
-    methods = []
-    for boxes in ("gliding", "fixed"):
-        solve = partial(_lacunarity, boxes)
-        errors = _replicates(_independent_cells, solve, exact, exact - 1.0)
-        methods.append(Method(f"lacunarity, {boxes} boxes", SIZES, _independent_cells, solve, errors))
-    return Benchmark(
-        "independent cells",
-        f"root mean square relative error of the lacunarity less one, over {REPLICATES} masks",
-        f"(1 - p)/(p r^2) for independent cells, p = {COVERAGE}, boxes of {BOX}",
-        tuple(methods),
-        True,
-    )
-
-
-def _independent_cells(n: float, seed: int = 0) -> xr.DataArray:
-    stream = np.random.default_rng(int(n) if seed == 0 else (int(n), seed))
-    return _mask(stream.random((int(n), int(n))) < COVERAGE)
-
-
-def _lacunarity(boxes: str, mask: xr.DataArray) -> float:
-    return float(domains.lacunarity(mask, [BOX], boxes=boxes, periodic=False)["lacunarity"].squeeze())
+def _independent_cells(n: float, seed: int) -> xr.DataArray:
+    return _mask(_stream(n, seed).random((int(n), int(n))) < COVERAGE)
 
 
 def _resolutions(n: float) -> list[xr.DataArray]:
@@ -188,16 +166,8 @@ def _resolutions(n: float) -> list[xr.DataArray]:
     return masks
 
 
-def _area_dimension(masks: list[xr.DataArray]) -> float:
-    return float(domains.area_dimension(masks)["area_dimension"])
-
-
 def _critical(n: float, seed: int = 0) -> xr.DataArray:
     return _mask(np.random.default_rng((int(n), seed)).random((int(n), int(n))) < CRITICAL)
-
-
-def _island_density(mask: xr.DataArray) -> float:
-    return float(domains.islands(mask, periodic=True, keep=())["n_islands"]) / mask.size
 
 
 def _crosses(mask: xr.DataArray) -> bool:
@@ -213,7 +183,3 @@ def _cascade(n: float) -> xr.DataArray:
     while measure.shape[0] < n:
         measure = np.kron(measure, WEIGHTS)
     return xr.DataArray(measure, dims=("y", "x"))
-
-
-def _moments(measure: xr.DataArray) -> Array:
-    return domains.generalised_dimensions(measure, list(ORDERS))["generalised_dimension"].values

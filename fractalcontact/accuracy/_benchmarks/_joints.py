@@ -17,6 +17,7 @@ from fractalcontact.accuracy._benchmarks import (
     Benchmark,
     Method,
     largest_error,
+    value_of,
 )
 
 RIPPLE = 0.6  # amplitude of the sinusoidal aperture over its mean
@@ -28,15 +29,17 @@ YOUNG = 30e9  # Pa
 def benchmarks() -> tuple[Benchmark, ...]:
     """Return the benchmarks of flow, dilatancy and closure."""
     sizes = (8, 16, 32, 64, 128, 256, 512)
+    aperture = value_of(joints.transmissivity, "hydraulic_aperture", {"axis": "x"})
+    dilatancy = value_of(joints.dilatancy, "rigid_dilatancy", shear=[SHEAR], direction="E")
     wrapped = partial(_corrugated, periodic=True)
     exact = APERTURE * ((1.0 - RIPPLE**2) ** 2.5 / (1.0 + RIPPLE**2 / 2.0)) ** (1.0 / 3.0)
     error = largest_error(exact, relative=True)
-    across = Method("transmissivity, across", sizes, _corrugated, _hydraulic_aperture, error)
-    around = Method("transmissivity, across, periodic", sizes[:5], wrapped, _hydraulic_aperture, error)
+    across = Method("transmissivity, across", sizes, _corrugated, aperture, error)
+    around = Method("transmissivity, across, periodic", sizes[:5], wrapped, aperture, error)
     error = largest_error(APERTURE, relative=True)
-    board = Method("transmissivity, checkerboard", sizes[:5], _checkerboard, _hydraulic_aperture, error)
+    board = Method("transmissivity, checkerboard", sizes[:5], _checkerboard, aperture, error)
     error = largest_error(2.0 * np.sin(np.pi * SHEAR))
-    rigid = Method("rigid dilatancy", sizes[1:], _wave_joint, _rigid_dilatancy, error)
+    rigid = Method("rigid dilatancy", sizes[1:], _wave_joint, dilatancy, error)
     error = largest_error(lambda _: _exact_closure(), relative=True)
     closure = Method("closure of the interface", TOLERANCES, _sheared_joint, _closure, error, TOLERANCE)
     return (
@@ -78,18 +81,10 @@ def _checkerboard(n: float) -> xr.DataArray:
     return _gap(APERTURE * cubes ** (1.0 / 3.0), 0.5 / n)
 
 
-def _hydraulic_aperture(gap: xr.DataArray) -> float:
-    return float(joints.transmissivity(gap)["hydraulic_aperture"].sel(axis="x"))
-
-
 def _wave_joint(n: float) -> joints.Crack:
     x = np.arange(int(n)) / n
     heights = np.broadcast_to(np.cos(2 * np.pi * x), (8, int(n)))  # 8 equal rows
     return joints.Crack(surfaces.from_array(heights, 1.0 / n, periodic=True), young=YOUNG, poisson=0.2)
-
-
-def _rigid_dilatancy(crack: joints.Crack) -> float:
-    return float(joints.dilatancy(crack, shear=[SHEAR], direction="E")["rigid_dilatancy"].squeeze())
 
 
 def _sheared_joint(tolerance: float) -> tuple[joints.Crack, float]:

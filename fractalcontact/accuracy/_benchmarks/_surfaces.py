@@ -21,11 +21,11 @@ ROLLOFF, SHORT = 0.5, 4.0  # of the extent; in spacings
 def benchmarks() -> tuple[Benchmark, ...]:
     """Return the benchmarks of the generators."""
     brownian: dict[str, Generator] = {
-        "fbm": partial(_with_increments, "fbm"),
-        "midpoint": partial(_with_increments, "midpoint"),
-        "midpoint, with additions": partial(_with_increments, "midpoint", additions=True),
-        "spectral": partial(_with_height, "spectral"),
-        "weierstrass": partial(_with_height, "weierstrass"),
+        "fbm": partial(surfaces.fbm, rms_increment=1.0),
+        "midpoint": partial(surfaces.midpoint, rms_increment=1.0),
+        "midpoint, with additions": partial(surfaces.midpoint, rms_increment=1.0, additions=True),
+        "spectral": partial(surfaces.spectral, rms_height=1.0),
+        "weierstrass": partial(surfaces.weierstrass, rms_height=1.0),
     }
     cutoffs: dict[str, Generator] = {
         f"spectral with cut-offs, {word} normalised": partial(_with_cutoffs, normalise=key)
@@ -55,7 +55,7 @@ def _method(name: str, make: Generator, measure: Callable[[Array], Array]) -> Me
     """Return a method whose replicates are what `measure` finds on each surface of an ensemble."""
 
     def solve(n: int) -> xr.DataArray:
-        return make(n, rng=0)
+        return make((n, n), 1.0, hurst=HURST, rng=0)
 
     def measured_ensemble(_: Any, parameter: float) -> Array:
         n = int(parameter)
@@ -64,27 +64,17 @@ def _method(name: str, make: Generator, measure: Callable[[Array], Array]) -> Me
         rng = np.random.default_rng(1)
         replicates: list[Array] = []
         while len(replicates) < count:
-            ensemble = make(n, members=min(batch, count - len(replicates)), rng=rng)
+            members = min(batch, count - len(replicates))
+            ensemble = make((n, n), 1.0, hurst=HURST, members=members, rng=rng)
             replicates += [measure(heights) for heights in ensemble.values]
         return np.array(replicates)
 
     return Method(name, (32, 64, 128, 256, 512, 1024), int, solve, measured_ensemble)
 
 
-def _with_increments(name: str, n: int, **options: Any) -> xr.DataArray:
-    surface: xr.DataArray = getattr(surfaces, name)((n, n), 1.0, hurst=HURST, rms_increment=1.0, **options)
-    return surface
-
-
-def _with_height(name: str, n: int, **options: Any) -> xr.DataArray:
-    surface: xr.DataArray = getattr(surfaces, name)((n, n), 1.0, hurst=HURST, rms_height=1.0, **options)
-    return surface
-
-
-def _with_cutoffs(n: int, **options: Any) -> xr.DataArray:
-    return surfaces.spectral(
-        (n, n), 1.0, hurst=HURST, rms_height=1.0, rolloff=ROLLOFF * n, short_cutoff=SHORT, **options
-    )
+def _with_cutoffs(shape: tuple[int, int], spacing: float, **options: Any) -> xr.DataArray:
+    band: dict[str, Any] = {"rolloff": ROLLOFF * shape[0] * spacing, "short_cutoff": SHORT * spacing}
+    return surfaces.spectral(shape, spacing, rms_height=1.0, **band, **options)
 
 
 def _scaled_increments(heights: Array) -> Array:
