@@ -19,17 +19,11 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from fractalcontact.base.errors import (
-    FractalContactError,
-    InvalidInput,
-    MissingExtra,
-    ScaleWarning,
-    TooLittleMemory,
-    warn,
-)
-from fractalcontact.base.files import is_pattern
-from fractalcontact.base.process import block_dask_import, collect_rarely
-from fractalcontact.base.resources import require_libraries
+import fractalcontact as fc  # loads its subpackages when they are used
+from fractalcontact.base import errors, files
+from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.process import block_dask_import, collect_rarely, peak_memory
+from fractalcontact.base.resources import most_workers, require_libraries
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128  # and the number of the signal: as of a shell (POSIX)
@@ -82,12 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         require_libraries()
         with leaving(_leave):
             code: int = options.action(options)
-    except TooLittleMemory as error:
+    except errors.FractalContactError as error:
         print(error, file=sys.stderr)
-        return FAILED
-    except FractalContactError as error:
-        print(error, file=sys.stderr)
-        return WRONG_INPUT
+        return FAILED if isinstance(error, errors.TooLittleMemory) else WRONG_INPUT
     except Stopped as stop:
         print(stop, file=sys.stderr)
         return STOPPED + stop.number
@@ -111,13 +102,11 @@ def command_help() -> dict[str, str]:
 
 def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentParser]]:
     """Return the parser of the command line, and that of each command by its name."""
-    from fractalcontact import __version__
-
     parser = argparse.ArgumentParser(
         prog="fractalcontact",
         description="Rough surfaces in contact: roughness, contact, closure, dilatancy and shear strength.",
     )
-    parser.add_argument("--version", action="version", version=f"fractalcontact {__version__}")
+    parser.add_argument("--version", action="version", version=f"fractalcontact {fc.__version__}")
     commands = parser.add_subparsers(required=True, metavar="command")
 
     run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
@@ -222,10 +211,8 @@ def _answer(options: argparse.Namespace) -> int:
     """Run the scene of a question, and write it beside its results."""
     import tomllib
 
-    from fractalcontact import scenes
-
     scan, upper = _scans(options)
-    several, folder = isinstance(scan, list) or is_pattern(scan), options.out
+    several, folder = isinstance(scan, list) or files.is_pattern(scan), options.out
     if folder is None:
         first = Path(scan[0] if isinstance(scan, list) else scan)
         stem = first.resolve().parent.name.replace("*", "") if several else first.name.partition(".")[0]
@@ -237,18 +224,15 @@ def _answer(options: argparse.Namespace) -> int:
     ):
         value = arguments.get(name)
         if value is not None and 0 < value < 1e4:  # Pa: below the softest gels, and the weakest clays
-            message = f"{option}: {value:g} Pa is {what}; is it {value:g} {unit}?"
-            warn(message, ScaleWarning)
+            errors.warn(f"{option}: {value:g} Pa is {what}; is it {value:g} {unit}?", errors.ScaleWarning)
     place = "." if options.scene else folder
     if options.question == "roughness" and not options.scene and not several:
-        from fractalcontact import surfaces
-
         reading = {name: arguments[name] for name in ("spacing", "units") if arguments[name] is not None}
-        heights = surfaces.read(scan, **reading)
+        heights = fc.surfaces.read(scan, **reading)
         if heights.dims == ("x",):
             return _profile_roughness(heights, Path(folder), Path(scan).name, options)
         arguments["surface"] = heights
-    text = scenes.template(options.question, scan, upper, folder=place, **arguments)
+    text = fc.scenes.template(options.question, scan, upper, folder=place, **arguments)
     if options.scene:
         print(text)
         return 0
@@ -258,7 +242,7 @@ def _answer(options: argparse.Namespace) -> int:
         expected = "no scene of yours under the name of the one that is written"
         got = f"{target.name!r} ({remedy})"
         raise InvalidInput(f"fractalcontact {options.question}", [f"-o: expected {expected}, got {got}"])
-    scene = scenes.Scene(options.question, tomllib.loads(text), Path(folder).absolute())
+    scene = fc.scenes.Scene(options.question, tomllib.loads(text), Path(folder).absolute())
     options.out, options.scene = folder, scene
     is_refused = False
     try:
@@ -273,13 +257,13 @@ def _answer(options: argparse.Namespace) -> int:
 
 def _scans(options: argparse.Namespace) -> tuple[Any, Any]:
     """Return the file, files or pattern of a command, and those of the upper faces of joints."""
-    files = options.scans
+    scans = options.scans
     if options.question != "joint":
-        return (files if len(files) > 1 else files[0]), None
-    half = len(files) // 2
-    lower, upper = files[:half], files[half:]
+        return (scans if len(scans) > 1 else scans[0]), None
+    half = len(scans) // 2
+    lower, upper = scans[:half], scans[half:]
     if len(lower) != len(upper):
-        got = f"{len(files)} files"
+        got = f"{len(scans)} files"
         raise InvalidInput("fractalcontact joint", [f"expected as many lower as upper faces, got {got}"])
     if half == 1:
         return lower[0], upper[0]
@@ -307,27 +291,23 @@ def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.
     """Print and save dimension, roughness coefficient and statistics of a profile, which need no scene."""
     import xarray as xr
 
-    from fractalcontact import dimensions, joints, save, scenes, surfaces
-    from fractalcontact import open as open_result
-    from fractalcontact.base.files import RESULT
-
-    title, target = f"Roughness of the profile {name}", folder / RESULT
-    if target.exists() and not options.force and open_result(target).attrs.get("title") != title:
+    title, target = f"Roughness of the profile {name}", folder / files.RESULT
+    if target.exists() and not options.force and fc.open(target).attrs.get("title") != title:
         expected = "a folder without results of another study (another folder, or --force)"
         raise InvalidInput("fractalcontact roughness", [f"-o: expected {expected}, got {folder.name!r}"])
-    profile = surfaces.despike(heights) if options.despike else heights
+    profile = fc.surfaces.despike(heights) if options.despike else heights
     level = 1 if options.level is None else options.level
-    levelled = surfaces.level(profile, level) if level else profile
+    levelled = fc.surfaces.level(profile, level) if level else profile
     groups = {
         "/surfaces": levelled.to_dataset(name="height"),
-        "/dimensions": dimensions.estimate(profile),
-        "/joints/roughness_coefficient": joints.roughness_coefficient(profile),
+        "/dimensions": fc.dimensions.estimate(profile),
+        "/joints/roughness_coefficient": fc.joints.roughness_coefficient(profile),
     }
     tree = xr.DataTree.from_dict(groups)
     tree.attrs["title"] = title
-    save(tree, target)
+    fc.save(tree, target)
     if not options.quiet:
-        print(f"{scenes.summary(tree, verbose=options.verbose)}\n\nwritten: {target}")
+        print(f"{fc.scenes.summary(tree, verbose=options.verbose)}\n\nwritten: {target}")
     return 0
 
 
@@ -343,26 +323,22 @@ def _is_unedited(text: str) -> bool:
 
 def _init(options: argparse.Namespace) -> int:
     """Write a commented scene and the schema that its first line names; an existing scene stays."""
-    from fractalcontact.base.files import SCHEMA, datasets_folder
-
-    target = Path(options.scene)
+    target, shipped = Path(options.scene), files.datasets_folder()
     if target.exists() or not target.parent.is_dir():
         expected = "the name of a new file in an existing folder"
         raise InvalidInput("fractalcontact init", [f"scene: expected {expected}, got {target.name!r}"])
-    target.write_text((datasets_folder() / "new_scene.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    target.with_name(SCHEMA).write_bytes((datasets_folder() / SCHEMA).read_bytes())
-    print(f"written: {target}, and {SCHEMA} for editors\nfractalcontact run {target} -o out")
+    target.write_text((shipped / "new_scene.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    target.with_name(files.SCHEMA).write_bytes((shipped / files.SCHEMA).read_bytes())
+    print(f"written: {target}, and {files.SCHEMA} for editors\nfractalcontact run {target} -o out")
     return 0
 
 
 def _run(options: argparse.Namespace) -> int:
-    from fractalcontact import scenes
-    from fractalcontact.base.files import RESULT
-    from fractalcontact.base.resources import most_workers
+    from fractalcontact.base.tables import screen_width
     from fractalcontact.base.validation import Problems
 
     if options.plan:
-        print(scenes.plan(scenes.validate(options.scene)))
+        print(fc.scenes.plan(fc.scenes.validate(options.scene)))
         return 0
     with Problems("fractalcontact run") as problems:
         problems.integer("--workers", options.workers, at_least=0, at_most=most_workers())
@@ -370,15 +346,13 @@ def _run(options: argparse.Namespace) -> int:
     out = Path(options.out or Path(str(options.scene)).stem)
     more = {"verbose": options.verbose, "workers": options.workers, "force": options.force}
     with _client(options.scheduler) as client:
-        tree = scenes.run(options.scene, out=out, progress=speaks, summary=speaks, client=client, **more)
+        tree = fc.scenes.run(options.scene, out=out, progress=speaks, summary=speaks, client=client, **more)
     if speaks:
-        from fractalcontact.base.tables import screen_width
-
         figures = len(list(out.glob("*.png")))
-        size = (out / RESULT).stat().st_size
+        size = (out / files.RESULT).stat().st_size
         drawn = f" and {figures} figure{'s' * (figures > 1)}" if figures else ""
-        files = f"{RESULT} ({size / 1e6:.2g} MB), report.html"
-        written = f"written to {out}: {files}{drawn}{_memory()}"
+        memory = f"; peak memory {peak / 1e6:.0f} MB" if (peak := peak_memory()) else ""
+        written = f"written to {out}: {files.RESULT} ({size / 1e6:.2g} MB), report.html{drawn}{memory}"
         print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
         print(f"next: open {out / 'report.html'} in a browser")
     has_failed = "overview" in tree.children and (tree["overview/status"] != "done").any()
@@ -391,10 +365,9 @@ def _client(address: str | None) -> Iterator[Any]:
     if address is None:
         yield None
         return
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise MissingExtra("--scheduler", "distributed", "dask") from error
+    errors.require_library("--scheduler", "distributed", "dask")
+    from distributed import Client
+
     try:
         client = Client(address)
     except (OSError, ValueError) as error:
@@ -406,103 +379,72 @@ def _client(address: str | None) -> Iterator[Any]:
         yield client
 
 
-def _memory() -> str:
-    """Return the peak memory of this process, where the system reports it."""
-    from fractalcontact.base.process import peak_memory
-
-    peak = peak_memory()
-    return f"; peak memory {peak / 1e6:.0f} MB" if peak else ""
-
-
 def _accuracy(options: argparse.Namespace) -> int:
     if options.out is not None:
-        from fractalcontact.base.files import output_folder
-
-        output_folder(options.out)  # before the measuring, not after it
+        files.output_folder(options.out)  # before the measuring, not after it
     if options.names == ["estimators"]:
         return _estimators(options)
-    return _error_against_time(options)
-
-
-def _error_against_time(options: argparse.Namespace) -> int:
-    from fractalcontact import accuracy
-
     with noted() as stop:
-        result = accuracy.measure(options.names or None, budget=options.budget, progress=True, stop=stop)
-    print(accuracy.summary(result))
+        result = fc.accuracy.measure(options.names or None, budget=options.budget, progress=True, stop=stop)
+    print(fc.accuracy.summary(result))
     if options.out is not None:
         written = [_save_accuracy(result, Path(options.out) / "accuracy.nc", stop)]
         for name, part in () if stop else result.children.items():
-            from fractalcontact.plotting import plot
-
             written.append(f"{name}.png")
-            _write_figure(plot(part.to_dataset()), Path(options.out) / written[-1])
+            _write_figure(part.to_dataset(), Path(options.out) / written[-1])
         print(f"\nwritten to {options.out}: {', '.join(written)}")
     if stop:
         raise Stopped(stop.number, "the results so far are printed above")
     return 0
 
 
-def _write_figure(axes: Any, path: Path) -> None:
-    """Write the figure of some Axes as PNG."""
-    axes.flat[0].figure.savefig(path, dpi=150)  # 13 pixels for the height of text of 6 points
+def _write_figure(result: Any, path: Path) -> None:
+    """Write the figure of a result as PNG."""
+    figure = fc.plotting.plot(result).flat[0].figure
+    figure.savefig(path, dpi=150)  # 13 pixels for the height of text of 6 points
 
 
 def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
     """Save a result and return the name of the file, which is another one where the run was stopped."""
-    from fractalcontact.base.files import PARTIAL_RESULT
-    from fractalcontact.base.netcdf import save
-
-    if stop:
-        return save(result, target.with_name(PARTIAL_RESULT)).name
-    target.with_name(PARTIAL_RESULT).unlink(missing_ok=True)
-    return save(result, target).name
+    partial = target.with_name(files.PARTIAL_RESULT)
+    if not stop:
+        partial.unlink(missing_ok=True)
+    return fc.save(result, partial if stop else target).name
 
 
 def _estimators(options: argparse.Namespace) -> int:
-    from fractalcontact import accuracy
-
     names = ("hurst", "sizes", "families", "methods", "members")
     arguments = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     file = None if options.out is None else Path(options.out) / "estimators.nc"
-    result = accuracy.estimators(**arguments, rng=options.seed, keep=file, progress=True)
-    print(accuracy.summary(result))
+    result = fc.accuracy.estimators(**arguments, rng=options.seed, keep=file, progress=True)
+    print(fc.accuracy.summary(result))
     if file is not None:
-        from fractalcontact.plotting import plot
-
-        _write_figure(plot(result), file.with_suffix(".png"))
+        _write_figure(result, file.with_suffix(".png"))
         print(f"\nwritten to {options.out}: estimators.nc, estimators.png")
     return 0
 
 
 def _report(options: argparse.Namespace) -> int:
-    from fractalcontact import open as open_result
-    from fractalcontact import scenes
-
-    tree = open_result(options.file)
-    path = scenes.report(tree, options.out or Path(options.file).with_name("report.html"))
+    tree = fc.open(options.file)
+    path = fc.scenes.report(tree, options.out or Path(options.file).with_name("report.html"))
     print(f"written: {path}")
     if options.csv is not None:
-        print(f"written to {options.csv}: {len(scenes.tables(tree, options.csv))} CSV files")
+        print(f"written to {options.csv}: {len(fc.scenes.tables(tree, options.csv))} CSV files")
     return 0
 
 
 def _export(options: argparse.Namespace) -> int:
-    from fractalcontact import open as open_result
-    from fractalcontact import scenes
-
     folder = options.out or Path(options.file).with_name("maps")
-    files = scenes.export(open_result(options.file), folder, to=options.to, force=options.force)
-    print(f"written to {folder}: {len(files)} files, {files[0].name} ...")
+    written = fc.scenes.export(fc.open(options.file), folder, to=options.to, force=options.force)
+    print(f"written to {folder}: {len(written)} files, {written[0].name} ...")
     return 0
 
 
 def _methods(options: argparse.Namespace) -> int:
     del options
-    from fractalcontact import dimensions
     from fractalcontact.base.tables import screen_width
 
-    for name, line in dimensions.methods().items():
+    for name, line in fc.dimensions.methods().items():
         print(textwrap.fill(f"{name:<20} {line}", screen_width(), subsequent_indent=" " * 21))
     return 0
 
