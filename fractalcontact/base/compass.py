@@ -30,33 +30,31 @@ class Direction:
     unit: tuple[float, float]
 
 
-def check_direction(problems: Problems, value: Any = GIVEN) -> bool:
+def check_direction(problems: Problems, argument: str = "direction", value: Any = GIVEN) -> bool:
     """Check for one compass word or azimuth in degrees, by default that of the argument `direction`."""
     value = problems.given.direction if value is GIVEN else value
     if isinstance(value, str):
         valid = WORDS.get(value, value) in AZIMUTHS
     else:
         valid = is_real(value) and bool(abs(value) < LARGEST_AZIMUTH)  # False for NaN
-    return problems.require(valid, "direction", EXPECTED, value)
+    return problems.require(valid, argument, EXPECTED, value)
 
 
-def check_directions(problems: Problems) -> bool:
-    """Check the argument `direction` for one direction or a sequence of them, in which each occurs once."""
-    value = problems.given.direction
+def check_directions(problems: Problems, argument: str = "direction", value: Any = GIVEN) -> bool:
+    """Check for one direction or a sequence of them in which each occurs once, as `check_direction` does."""
+    value = problems.given.direction if value is GIVEN else value
     if not is_single(value) and not isinstance(value, (list, tuple, np.ndarray)):
-        problems.add("direction", f"{EXPECTED}, or a list of them")
-        return False
+        return problems.require(False, argument, f"{EXPECTED}, or a list of them", value)
     values = [value] if is_single(value) else list(value)
     if not values:
-        problems.add("direction", EXPECTED, "an empty sequence")
-        return False
-    valid = [check_direction(problems, item) for item in values]
+        return problems.require(False, argument, EXPECTED, "an empty sequence")
+    valid = [check_direction(problems, argument, item) for item in values]
     if not all(valid):
         return False
     names = [direction.name for direction in read_directions(value)]
     repeated = sorted({name for name in names if names.count(name) > 1})
     got = f"{', '.join(repeated)} several times"
-    return problems.require(not repeated, "direction", "every direction once", got)
+    return problems.require(not repeated, argument, "every direction once", got)
 
 
 def read_directions(value: Any) -> tuple[Direction, ...]:

@@ -205,7 +205,7 @@ class Crack:
     def travel(self, direction: str | float = "E") -> float:
         """Return the greatest shear towards `direction`, m; infinite where the face wraps."""
         with Problems(f"{WHERE}.travel") as problems:
-            check_direction(problems, direction)
+            check_direction(problems, value=direction)
         return self.layout.travel(read_direction(direction).unit)
 
     def faces(self) -> tuple[Array, Array]:

@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fractalcontact.base.compass import AZIMUTHS, LARGEST_AZIMUTH
-from fractalcontact.base.compass import WORDS as AZIMUTH_WORDS
+from fractalcontact.base import compass
 from fractalcontact.base.units import PRESSURE, UNITS
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._scene import LOADS, OF_SURFACE, Table
@@ -54,7 +53,7 @@ PRESSURES = (
     "wall_strength", "compressive_strength", "tensile_strength", "cohesion", "upstream_pressure",
     "downstream_pressure", "drain_pressure", "total_stress",
 )  # fmt: skip
-SPELLINGS: dict[str, dict[str, str]] = {"direction": AZIMUTH_WORDS, "dimensions": {"psd": "spectrum"}}
+SPELLINGS: dict[str, dict[str, str]] = {"direction": compass.WORDS, "dimensions": {"psd": "spectrum"}}
 BOUNDS = {
     "above": "exclusiveMinimum",
     "at_least": "minimum",
@@ -137,17 +136,6 @@ def _check_files(problems: Problems, place: str, value: Any) -> None:
     problems.require(bool(files), place, "a file, a pattern or a list of files", files)
 
 
-def _check_directions(problems: Problems, place: str, value: Any) -> None:
-    for direction in value if isinstance(value, list) else [value]:
-        _check_direction(problems, place, direction)
-
-
-def _check_direction(problems: Problems, place: str, value: Any) -> None:
-    is_azimuth = isinstance(value, (int, float)) and not isinstance(value, bool)
-    valid = value in COMPASS or (is_azimuth and abs(value) < LARGEST_AZIMUTH)
-    problems.require(valid, place, f"one of {', '.join(COMPASS)}, or an azimuth in degrees", value)
-
-
 def _check_value(problems: Problems, place: str, value: Any) -> None:
     """Check that an argument is no table, which would be taken for that of a stage and left out."""
     is_told = any(f"{argument}.".startswith(f"{place}.") for argument in problems.arguments)
@@ -164,13 +152,12 @@ def _unchecked(problems: Problems, place: str, value: Any) -> None:
     """Leave the check to the function that takes the value."""
 
 
-COMPASS = tuple(AZIMUTHS)
-_AZIMUTH = number(above=-LARGEST_AZIMUTH, below=LARGEST_AZIMUTH).schema
-_DIRECTION = {"anyOf": [{"enum": [*COMPASS, *AZIMUTH_WORDS]}, _AZIMUTH]}
+_AZIMUTH = number(above=-compass.LARGEST_AZIMUTH, below=compass.LARGEST_AZIMUTH).schema
+_DIRECTION = {"anyOf": [{"enum": [*compass.AZIMUTHS, *compass.WORDS]}, _AZIMUTH]}
 ANYTHING, VALUE = Kind(_unchecked), Kind(_check_value)
 FLAG = Kind(Problems.boolean, {"type": "boolean"})
 FILES = Kind(_check_files, _one_or_several({"type": "string", "minLength": 1}, minItems=1))
-DIRECTION = Kind(_check_direction, _DIRECTION)
+DIRECTION = Kind(compass.check_direction, _DIRECTION)
 TITLE = Kind(
     lambda problems, place, value: problems.require(isinstance(value, str), place, "words", value),
     {"type": "string"},
@@ -184,7 +171,7 @@ SHARED = {
     "block": _numbers(above=0.0).about("Edges of the upper block, m."),
     **dict.fromkeys(("spacing", "structure_size"), _numbers(above=0.0)),
     **{key: _numbers(unit=key in PRESSURES, at_least=0.0) for key in ("shear", *LOADS)},
-    "direction": Kind(_check_directions, _one_or_several(_DIRECTION)),
+    "direction": Kind(compass.check_directions, _one_or_several(_DIRECTION)),
 }
 LEVEL = _integer(at_least=0).about("Remove the least-squares polynomial of this degree.")
 OF_FILES = {
@@ -221,11 +208,15 @@ OF_JOINT = {
 
 @dataclass(frozen=True)
 class Keys:
-    """The keys of a table: the kind of each, those that it must have, and the stages with a table in it."""
+    """The keys of a table: the kind of each, those that it must have, and the stages with a table in it.
+
+    The docstrings of the `functions` say what the keys mean.
+    """
 
     kinds: Mapping[str, Kind]
     required: tuple[str, ...] = ()
     stages: Mapping[str, StageType] = field(default_factory=dict)
+    functions: tuple[str, ...] = ()
 
 
 def surface_forms(place: str) -> dict[str, Keys]:
@@ -236,9 +227,10 @@ def surface_forms(place: str) -> dict[str, Keys]:
         "pattern (scans/*.sur) or a list."
     )
     sample = _choice(SAMPLES).about("A surface that is installed with the package.")
+    functions = ("surfaces.read",)
     forms = {
-        "read": Keys({"read": read} | OF_FILES | plane, ("read",)),
-        "sample": Keys({"sample": sample} | OF_FILES, ("sample",)),
+        "read": Keys({"read": read} | OF_FILES | plane, ("read",), functions=functions),
+        "sample": Keys({"sample": sample} | OF_FILES, ("sample",), functions=functions),
     }
     for name in GENERATORS:
         keys, required = arguments_of(f"surfaces.{name}")
@@ -250,7 +242,7 @@ def surface_forms(place: str) -> dict[str, Keys]:
             kinds["direction"] = DIRECTION
         text = "A synthetic surface; the other keys are the arguments of this function."
         kinds |= {"generate": Kind(_unchecked, {"const": name}, text), "level": LEVEL}
-        forms[name] = Keys(kinds, ("generate", *sorted(required)))
+        forms[name] = Keys(kinds, ("generate", *sorted(required)), functions=(f"surfaces.{name}",))
     return forms
 
 
@@ -274,14 +266,18 @@ def keys_of(table: str, given: Table | None = None) -> Keys:
     stages = {place.partition(".")[2]: row for place, row in rows.items() if place != table}
     if table == "joint":  # the arguments of its stages may stand in it too
         common = (key for row in stages.values() for key in row.arguments())
-        return Keys(_arguments(("block", *common)) | OF_JOINT, (), stages)
-    own = rows[table].arguments() if table in rows else ()
-    return Keys(_arguments(key for key in own if key != "methods"), (), stages)  # methods are in [want]
+        functions = tuple(row.function for row in stages.values())
+        return Keys(_arguments(("block", *common)) | OF_JOINT, (), stages, functions)
+    if table not in rows:
+        return Keys({}, (), stages)
+    own = keys_of_stage(rows[table])
+    kinds = {key: kind for key, kind in own.kinds.items() if key != "methods"}  # these are in [want]
+    return replace(own, kinds=kinds, stages=stages)
 
 
 def keys_of_stage(row: StageType) -> Keys:
     """Return the keys of the table of a stage, `[joint.closure]` for example."""
-    return Keys(_arguments(row.arguments()))
+    return Keys(_arguments(row.arguments()), functions=(row.function,))
 
 
 def _arguments(names: Iterable[str]) -> dict[str, Kind]:
@@ -314,17 +310,15 @@ def json_schema() -> Schema:
     >>> schema["properties"]["material"]["properties"]["young"]["description"]
     "Young's modulus, Pa."
     """
-    tables = {
-        name: {
-            **(_surface(name) if name in ("surface", "upper") else _with_stages(name)),
-            "description": text,
-        }
-        for name, text in TABLES.items()
-    }
+    tables = {name: _table_of(keys_of(name)) for name in TABLES if name not in ("surface", "upper")}
+    tables["want"]["minProperties"] = 1
+    for name in ("surface", "upper"):  # one form for files, one for samples, one for each generator
+        tables[name] = {"type": "object", "oneOf": [_table_of(keys) for keys in surface_forms(name).values()]}
+    described = {name: {**tables[name], "description": text} for name, text in TABLES.items()}
     return {
         "$schema": DRAFT,
         "title": "Scene of fractalcontact",
-        **_table({"title": _described(TITLE, "")} | tables),
+        **_table({"title": _described(TITLE, "")} | described),
         "required": ["want"],
         "anyOf": [{"required": ["surface"]}, {"required": ["joint"]}],
         "definitions": dict(zip(("even_range", "logarithmic_range"), _ranges(), strict=True)),
@@ -351,40 +345,21 @@ def _ranges() -> list[Schema]:
     return [_table(words) | {"required": list(words)} for words in (even, logarithmic)]
 
 
-def _surface(place: str) -> Schema:
-    """Return the table of a surface: one form for files, one for samples, one for each generator."""
-    forms = surface_forms(place)
-    functions = {"read": "surfaces.read", "sample": "surfaces.read"}
-    tables = [
-        _table(_properties(keys, parameter_texts(functions.get(form, f"surfaces.{form}"))))
-        | {"required": list(keys.required)}
-        for form, keys in forms.items()
-    ]
-    return {"type": "object", "oneOf": tables}
-
-
-def _properties(keys: Keys, texts: Mapping[str, str]) -> dict[str, Schema]:
-    return {key: _described(kind, texts.get(key, "")) for key, kind in keys.kinds.items()}
-
-
-def _with_stages(name: str) -> Schema:
+def _table_of(keys: Keys) -> Schema:
     """Return a table with keys of its own and a table for each of its stages."""
-    keys = keys_of(name)
     texts: dict[str, str] = {}
-    if name in STAGES:  # the arguments of one function
-        texts = parameter_texts(STAGES[name].function)
-    elif name == "joint":  # arguments that several stages share: the first words about each
-        for row in keys.stages.values():
-            texts = parameter_texts(row.function) | texts
-    properties = _properties(keys, texts)
+    for function in keys.functions:  # of arguments that several stages share the first words about each
+        texts = parameter_texts(function) | texts
+    properties = {key: _described(kind, texts.get(key, "")) for key, kind in keys.kinds.items()}
     for word, row in keys.stages.items():
-        table = _table(_properties(keys_of_stage(row), parameter_texts(row.function)))
-        table["description"] = f"Arguments of fractalcontact.{row.function}."
+        table = _table_of(keys_of_stage(row)) | {
+            "description": f"Arguments of fractalcontact.{row.function}."
+        }
         if own := properties.get(word):  # [joint.closure] is a stage, closure = 1e-6 a load
             schema = keys.kinds[word].schema
             table = {**own, "anyOf": [*schema.get("anyOf", [schema]), table]}
         properties[word] = table
-    return _table(properties) | ({"minProperties": 1} if name == "want" else {})
+    return _table(properties) | ({"required": list(keys.required)} if keys.required else {})
 
 
 def parameter_texts(function: str) -> dict[str, str]:
