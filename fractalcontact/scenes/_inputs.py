@@ -28,6 +28,8 @@ from fractalcontact.scenes._stage_type import StageType, parameters_of, public_f
 if TYPE_CHECKING:
     import xarray as xr
 
+    from fractalcontact.joints import Crack
+
 VARIABLE = re.compile(r"\$\{?(\w+)\}?")
 
 
@@ -212,6 +214,15 @@ def crack_options(scene: Scene, row: StageType | None = None) -> dict[str, Any]:
         "block": own.get("block", scene.joint.block),
     }
     return {key: value for key, value in options.items() if value is not None}
+
+
+def crack_of(
+    scene: Scene, lower: xr.DataArray, upper: xr.DataArray | None, row: StageType | None = None
+) -> Crack:
+    """Return the crack of the scene, or that of a stage with a block of its own."""
+    from fractalcontact.joints import Crack
+
+    return Crack(lower, upper, **crack_options(scene, row))
 
 
 def contact_modulus(material: MaterialTable) -> float:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,14 +26,11 @@ from fractalcontact.base.provenance import with_provenance
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes._domain_stages import SIGNATURE
-from fractalcontact.scenes._inputs import call_options, crack_options, read_surface, stage_options
+from fractalcontact.scenes._inputs import call_options, crack_of, read_surface, stage_options
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stage_type import CONTACT_MAPS, StageType, parameters_of, public_function
+from fractalcontact.scenes._stage_type import CONTACT_MAPS, parameters_of, public_function
 from fractalcontact.scenes._stages import STAGES, Stage, only_describes_surface, section_length
 from fractalcontact.scenes._validation import require_above, validate_placed
-
-if TYPE_CHECKING:
-    from fractalcontact.joints import Crack
 
 Results = Mapping[str, xr.Dataset]
 Part = Callable[[], xr.Dataset]
@@ -194,7 +191,8 @@ def stage_work(
         options["shear"] = np.max(options["shear"])  # the figures draw the last one
     if "joints/closure" in stage.needs:
         options |= _pressed(scene, results, options)
-    crack = _crack(scene, results, row)
+    upper = _heights(results, "joints/faces") if "joints/faces" in results else None
+    crack = crack_of(scene, _heights(results, "surfaces"), upper, row)
     nodes = crack.layout.cells[0] * crack.layout.cells[1]
     return _split(stage, partial(call, row.function, crack), options, nodes)
 
@@ -276,13 +274,6 @@ def _upper_face(scene: Scene, lower: xr.DataArray, upper: xr.DataArray | None) -
         faces = as_dataset(upper.rename("height"))
     prepared = upper.attrs.get("preparation")
     return faces.assign_attrs(preparation=prepared) if prepared else faces
-
-
-def _crack(scene: Scene, results: Results, row: StageType) -> Crack:
-    from fractalcontact import joints
-
-    upper = _heights(results, "joints/faces") if "joints/faces" in results else None
-    return joints.Crack(_heights(results, "surfaces"), upper, **crack_options(scene, row))
 
 
 def call(function: str, *arguments: Any, **options: Any) -> xr.Dataset:

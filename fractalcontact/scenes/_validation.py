@@ -12,13 +12,13 @@ import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory, warn
-from fractalcontact.base.grid import UNIFORM, distinct, plane_coords, read_grid
+from fractalcontact.base.grid import distinct, plane_coords, read_grid
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.resources import require_memory
 from fractalcontact.base.schema import label
@@ -28,15 +28,15 @@ from fractalcontact.scenes import _inputs
 from fractalcontact.scenes._inputs import (
     call_options,
     contact_modulus,
-    crack_options,
+    crack_of,
     stage_options,
     values_of,
 )
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import check_tables, parse, scans_of
 from fractalcontact.scenes._scene_keys import GENERATORS
-from fractalcontact.scenes._stage_type import StageType, arguments_of, parameters_of, public_function
-from fractalcontact.scenes._stages import STAGES, WANTED, Stage, stages_of
+from fractalcontact.scenes._stage_type import StageType, parameters_of, public_function
+from fractalcontact.scenes._stages import STAGES, stages_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,10 +92,9 @@ def validated(scene: Scene | str | os.PathLike[str]) -> tuple[Scene, dict[str, x
         if not _is_valid(problems, "material"):
             known = {key: table for key, table in scene.tables.items() if key != "material"}
             scene = replace(scene, tables=known)
-        if not _is_valid(problems, "want"):
-            scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
-        _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
+        if _is_valid(problems, "want"):  # or nothing says which calls there are
+            _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
     warn_of(implausible_input(scene, surfaces["surface"]))
     return scene, {name: face for name, face in surfaces.items() if "generate" not in scene.table(name)}
 
@@ -130,7 +129,9 @@ def _require_valid_scan(scans: Mapping[str, Scene]) -> None:
 
 
 @contextmanager
-def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
+def _collected(
+    problems: Problems, place: str, *tables: str, ignored: Sequence[str] = INPUTS
+) -> Iterator[None]:
     """Collect the problems of a call, but for its inputs and for values that the tables were told of.
 
     An input that could not be made is passed as None, so that the other arguments are checked all the same.
@@ -142,27 +143,10 @@ def _collected(problems: Problems, place: str, *tables: str) -> Iterator[None]:
     except InvalidInput as error:
         for line in error.problems:
             argument = line.partition(":")[0].partition(".")[0]
-            if argument not in INPUTS and not any(
+            if argument not in ignored and not any(
                 f"{table}.{argument}" in problems.arguments for table in tables
             ):
                 problems.note(f"{tables[0] or place}.{argument}", f"{place}: {line}")
-
-
-def _with_possible_want(scene: Scene) -> Scene:
-    """Return a scene that wants what its tables are for, in place of words that were refused.
-
-    Otherwise a wrong word would hide the problems of the calls.
-    """
-    want = {name: [word for word in scene.wanted(name) if word in words] for name, words in WANTED.items()}
-    for row in STAGES.values():
-        name, _, word = row.table.partition(".")
-        if row.table and row.wanted and (word in scene.table(name) if word else name in scene.tables):
-            group, _, asked = row.wanted.partition(".")
-            want[group].append(asked)
-    if "dimensions" in scene.tables:
-        want["dimensions"] = ["default"]
-    possible = {name: list(dict.fromkeys(words)) for name, words in want.items() if words}
-    return replace(scene, tables={**scene.tables, "want": possible})
 
 
 def _is_valid(problems: Problems, *keys: str) -> bool:
@@ -177,9 +161,9 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
     for name, table in (("surface", scene.surface), ("upper", scene.upper)):
         if table is None:
             continue
-        if generator := _generator(table):
+        if table.generate in GENERATORS:
             with _collected(problems, name, name):
-                _validate_call(f"surfaces.{generator}", **_inputs.generator_options(table))
+                _validate_call(f"surfaces.{table.generate}", **_inputs.generator_options(table))
         if _is_valid(problems, name) and (name == "surface" or scene.want.joints):
             with problems.collect(f"{name}: "):
                 flat = _flat_surface(table)
@@ -200,20 +184,11 @@ def require_above(upper: xr.DataArray, lower: xr.DataArray, problems: Problems) 
     problems.require(not mean < 0, "upper", expected, Words(f"a mean aperture of {quantity_text(mean, 'm')}"))
 
 
-def _generator(table: SurfaceTable) -> str | None:
-    """Return the generator of a table; for an unknown one the first that takes all its arguments."""
-    if table.generate is None or table.generate in GENERATORS:
-        return table.generate
-    keys = {name: arguments_of(f"surfaces.{name}")[0] for name in GENERATORS}
-    return next((name for name in GENERATORS if set(table.options) <= set(keys[name])), None)
-
-
 def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
     """Return a flat surface in place of a large generated one; None for all others."""
     if table.generate is None:
         return None
     shape = table.options["shape"]
-    shape = shape if isinstance(shape, list) else [shape] * 2
     if math.prod(shape) < 1 << 18:  # points: made twice in little time
         return None
     needed = 24.0 * sum(shape)  # bytes of a coordinate while it is made
@@ -231,51 +206,16 @@ def _zeros(
 
 
 def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> Crack | None:
-    """Return the crack of the scene, None without one; its shears must not push the block off its face."""
+    """Return the crack of the scene, None without a valid one."""
     joint_presses = bool(scene.want.domains) and not scene.is_pressed
     slides = any(STAGES[f"joints/{name}"].takes != "surface" for name in scene.want.joints)
     if not (slides or joint_presses) or not _is_valid(problems, "material", "joint.block"):
         return None
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
         return None
-    crack = None
     with problems.collect("joint: "):
-        crack = _crack(scene, surfaces)
-        for stage in stages_of(scene):
-            tables = ("joint", stage.row.table)
-            keys = [f"{table}.{key}" for table in tables for key in ("shear", "direction")]
-            if stage.row.takes == "crack" and _is_valid(problems, *keys):
-                sliding = _own_crack(scene, surfaces, crack, stage.row, problems)
-                _validate_travel(sliding, stage, scene, problems)
-    return crack
-
-
-def _crack(scene: Scene, surfaces: dict[str, xr.DataArray], row: StageType | None = None) -> Crack:
-    """Return the crack of the scene, or that of a stage with a block of its own."""
-    faces = surfaces["surface"], surfaces.get("upper")
-    crack: Crack = public_function("joints.Crack")(*faces, **crack_options(scene, row))
-    return crack
-
-
-def _own_crack(
-    scene: Scene, surfaces: dict[str, xr.DataArray], crack: Any, row: StageType, problems: Problems
-) -> Any:
-    """Return the crack of a stage: that of the scene unless the stage has a valid block of its own."""
-    has_own = crack is not None and "block" in scene.joint.stages.get(row.word, {})
-    valid = has_own and _is_valid(problems, f"{row.table}.block")
-    return _crack(scene, surfaces, row) if valid else crack
-
-
-def _validate_travel(crack: Crack, stage: Stage, scene: Scene, problems: Problems) -> None:
-    options = stage_options(scene, stage.row)
-    if "shear" not in options:
-        return
-    directions = options.get("direction", parameters_of(stage.row.function)["direction"].default)
-    longest = float(np.max(options["shear"]))
-    for direction in directions if isinstance(directions, (list, tuple)) else [directions]:
-        travel = crack.travel(direction)
-        if longest > travel * (1.0 + UNIFORM):
-            problems.add(f"{stage.name}: shear", f"at most {travel:g} m towards {direction}", longest)
+        return crack_of(scene, surfaces["surface"], surfaces.get("upper"))
+    return None
 
 
 def _validate_calls(
@@ -286,14 +226,16 @@ def _validate_calls(
     # which loads are possible depends on the heights
     is_flat = surface is not None and _flat_surface(scene.surface) is not None
     for stage in stages_of(scene):
-        row, subject = stage.row, surface
-        if row.takes in ("file", "result", "study") or (is_flat and row.presses):
+        row, subject = stage.row, cast(Any, surface)
+        if row.takes in ("file", "result", "study") or (row.takes == "crack" and scene.joint.register):
             continue
-        if row.takes == "crack" and scene.joint.register:
-            continue
-        with _collected(problems, stage.name, row.table, row.table.partition(".")[0]):
+        ignored = (*INPUTS, *LOADS) if is_flat and row.presses else INPUTS
+        with _collected(problems, stage.name, row.table, row.table.partition(".")[0], ignored=ignored):
             if row.takes == "crack":
-                subject = _own_crack(scene, surfaces, crack, row, problems)
+                subject = crack
+                own_block = scene.joint.stages.get(row.word, {}).get("block")
+                if crack is not None and own_block is not None and _is_valid(problems, f"{row.table}.block"):
+                    subject = crack_of(scene, surfaces["surface"], surfaces.get("upper"), row)
             elif row.takes == "map":
                 subject = _empty_maps(scene, surface, crack, row)
             _validate_call(row.function, subject, **call_options(scene, row, stage.keep))
