@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from importlib.util import find_spec
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import MissingExtra
+from fractalcontact.base.errors import require_library
 from fractalcontact.base.files import written_whole
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.validation import Problems, Words, writing
 
 Array = np.ndarray[Any, np.dtype[Any]]
+
+_File = tuple[str, Callable[[Path], None]]  # its name, and what writes it
 
 WHERE = "fractalcontact.scenes.export"
 MAP_DIMS = frozenset({"x", "y"})
@@ -170,8 +172,8 @@ def export(
         problems.path("folder", folder)
         problems.choice("to", to, FORMATS)
         problems.boolean("force", force)
-    if to == "vti" and find_spec("pyevtk") is None:
-        raise MissingExtra("VTK image data", "pyevtk", "vtk")
+    if to == "vti":
+        require_library("VTK image data", "pyevtk", "vtk")
     if isinstance(result, xr.DataArray):
         result = result.to_dataset(name="values" if result.name is None else result.name)
     with Problems(WHERE) as problems:
@@ -179,12 +181,9 @@ def export(
             for dim in sorted(MAP_DIMS & set(dataset.coords)):
                 kind = dataset[dim].dtype
                 problems.require(kind.kind in "iuf", f"result.{dim}", "numbers in metres", f"type {kind}")
-    if isinstance(result, xr.DataTree):
-        result = result.map_over_datasets(_ascending)
-    else:
-        result = _ascending(result)
+    result = result.map_over_datasets(_ascending) if isinstance(result, xr.DataTree) else _ascending(result)
     target = Path(folder)
-    files = {target / file.name: file for group in groups_of(result) for file in FORMATS[to](*group)}
+    files = {target / name: write for group in groups_of(result) for name, write in FORMATS[to](*group)}
     with Problems(WHERE) as problems:
         problems.require(bool(files), "result", "maps over y and x", Words("none"))
         taken = [path.name for path in files if path.exists()] if not force else []
@@ -192,22 +191,15 @@ def export(
         problems.require(not taken, "folder", expected, Words(f"{target.name!r} with {', '.join(taken[:3])}"))
     with writing(WHERE, "folder", target):
         target.mkdir(parents=True, exist_ok=True)
-        for path, file in files.items():
+        for path, write in files.items():
             with written_whole(path) as temporary:
-                file.write(temporary)
+                write(temporary)
     return list(files)
 
 
 def _ascending(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset whose y and x ascend."""
     return dataset.sortby([dim for dim in dataset.dims if dim in MAP_DIMS and dim in dataset.coords])
-
-
-class _File(NamedTuple):
-    """The name of a file, and what writes it."""
-
-    name: str
-    write: Callable[[Path], Any]
 
 
 def _maps(dataset: xr.Dataset) -> Iterator[tuple[tuple[str, ...], list[str]]]:
@@ -227,21 +219,18 @@ def _vti_files(group: str, dataset: xr.Dataset) -> Iterator[_File]:
             place = "".join(f"_{dim}{number:03d}" for dim, number in zip(leading, index, strict=True))
             own = "" if leading or len(list(_maps(dataset))) == 1 else "_surface"
             planes = {heading(dataset, name): each[index] for name, each in maps.items()}
-            yield _File(f"{group}{own}{place}.vti", _vti_writer(planes))
+            yield f"{group}{own}{place}.vti", partial(_write_vti, planes)
 
 
-def _vti_writer(planes: dict[str, xr.DataArray]) -> Callable[[Path], Any]:
-    def write(path: Path) -> None:
-        from pyevtk.hl import imageToVTK
+def _write_vti(planes: dict[str, xr.DataArray], path: Path) -> None:
+    from pyevtk.hl import imageToVTK
 
-        plane = next(iter(planes.values()))
-        origin, spacing = zip(*(_axis(plane[dim].values) for dim in ("x", "y")), strict=True)
-        points = {name: _column_major(each.values) for name, each in planes.items()}
-        # a spacing of 0 across the plane is refused by ParaView's filters
-        written = imageToVTK(str(path), (*origin, 0.0), (*spacing, min(spacing)), pointData=points)
-        Path(written).replace(path)
-
-    return write
+    plane = next(iter(planes.values()))
+    origin, spacing = zip(*(_axis(plane[dim].values) for dim in ("x", "y")), strict=True)
+    points = {name: _column_major(each.values) for name, each in planes.items()}
+    # a spacing of 0 across the plane is refused by ParaView's filters
+    written = imageToVTK(str(path), (*origin, 0.0), (*spacing, min(spacing)), pointData=points)
+    Path(written).replace(path)
 
 
 def _axis(values: Array) -> tuple[float, float]:
@@ -259,28 +248,25 @@ def _column_major(values: Array) -> Array:
 def _tiff_files(group: str, dataset: xr.Dataset) -> Iterator[_File]:
     for leading, names in _maps(dataset):
         for name in names:
-            yield _File(f"{group}_{name}.tif", _tiff_writer(dataset, name, leading))
+            yield f"{group}_{name}.tif", partial(_write_tiff, dataset, name, leading)
 
 
-def _tiff_writer(dataset: xr.Dataset, name: str, leading: tuple[str, ...]) -> Callable[[Path], Any]:
-    def write(path: Path) -> None:
-        import tifffile
+def _write_tiff(dataset: xr.Dataset, name: str, leading: tuple[str, ...], path: Path) -> None:
+    import tifffile
 
-        field = dataset[name].transpose(*leading, "y", "x")
-        is_flag = field.dtype.kind == "b" or (field.dtype.kind in "iu" and field.dtype.itemsize == 1)
-        values = field.values.astype(np.uint8 if is_flag else np.float32)
-        planes = values.reshape(-1, *values.shape[-2:])[:, ::-1]
-        (_, dx), (_, dy) = (_axis(field[dim].values) for dim in ("x", "y"))
-        metadata = {
-            "axes": "ZYX",
-            "unit": "um",
-            "Labels": [_label(field, leading, index) for index in np.ndindex(*values.shape[:-2])],
-            "Info": f"{heading(dataset, name)}: {field.attrs.get('long_name', name)}",
-        }
-        resolution = 1e-6 / dx, 1e-6 / dy  # pixels per unit: ImageJ shows lengths in it
-        tifffile.imwrite(path, planes, imagej=True, resolution=resolution, metadata=metadata)
-
-    return write
+    field = dataset[name].transpose(*leading, "y", "x")
+    is_flag = field.dtype.kind == "b" or (field.dtype.kind in "iu" and field.dtype.itemsize == 1)
+    values = field.values.astype(np.uint8 if is_flag else np.float32)
+    planes = values.reshape(-1, *values.shape[-2:])[:, ::-1]
+    (_, dx), (_, dy) = (_axis(field[dim].values) for dim in ("x", "y"))
+    metadata = {
+        "axes": "ZYX",
+        "unit": "um",
+        "Labels": [_label(field, leading, index) for index in np.ndindex(*values.shape[:-2])],
+        "Info": f"{heading(dataset, name)}: {field.attrs.get('long_name', name)}",
+    }
+    resolution = 1e-6 / dx, 1e-6 / dy  # pixels per unit: ImageJ shows lengths in it
+    tifffile.imwrite(path, planes, imagej=True, resolution=resolution, metadata=metadata)
 
 
 def _label(field: xr.DataArray, leading: tuple[str, ...], index: tuple[int, ...]) -> str:

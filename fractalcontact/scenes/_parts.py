@@ -7,7 +7,6 @@ may run anywhere and in any order; the joined result is the same.
 from __future__ import annotations
 
 import json
-import time
 import warnings
 from collections import ChainMap
 from collections.abc import Callable, Iterable, Mapping
@@ -34,6 +33,7 @@ from fractalcontact.scenes._validation import require_above, validate_placed
 
 Results = Mapping[str, xr.Dataset]
 Part = Callable[[], xr.Dataset]
+Reader = Callable[..., xr.Dataset]
 
 
 @dataclass(frozen=True)
@@ -54,73 +54,6 @@ class StageWork:
             rows = [row for row in rows if len(row) == length] or rows[:1]
             results = [concatenate(row, dim) for row in rows]
         return results[0] if results else None
-
-
-@dataclass(frozen=True, repr=False)
-class MapReader:
-    """A public function of one map of a part."""
-
-    function: str
-    variable: str
-    options: Mapping[str, Any]
-
-    def __call__(self, source: xr.Dataset) -> xr.Dataset:
-        """Return the result of the function for the map."""
-        return call(self.function, with_provenance(source, self.variable), **self.options)
-
-
-@dataclass(frozen=True, repr=False)
-class ReaderOfSignature:
-    """A public function of all maps that takes their signature too, which it would compute again."""
-
-    function: MapReader
-    source: xr.Dataset
-
-    def __call__(self, signature: xr.Dataset) -> xr.Dataset:
-        """Return the result of the function for the maps."""
-        options = {**self.function.options, "signature": signature}
-        return replace(self.function, options=options)(self.source)
-
-
-@dataclass(frozen=True, repr=False)
-class PartWithReaders:
-    """A part and the stages that read its result; maps that nothing else needs are dropped afterwards.
-
-    What fails has its error as result: the part of a reader that fails, and the other readers, are kept.
-    """
-
-    part: Part
-    readers: tuple[Callable[[xr.Dataset], xr.Dataset], ...] = ()
-    dropped: tuple[str, ...] = ()
-
-    def __call__(self) -> tuple[list[xr.Dataset | Exception], list[float]]:
-        """Return the results and the seconds each took."""
-        start = time.perf_counter()
-        try:
-            source = self.part()
-        except Exception as error:
-            return [error] * (1 + len(self.readers)), [0.0] * (1 + len(self.readers))
-        seconds = [time.perf_counter() - start]
-        results: list[xr.Dataset | Exception] = []
-        for reader in self.readers:
-            start = time.perf_counter()
-            try:
-                results.append(reader(source))
-            except Exception as error:
-                results.append(error)
-            seconds.append(time.perf_counter() - start)
-        return [without(source, self.dropped), *results], seconds
-
-
-@dataclass(frozen=True, repr=False)
-class Precomputed:
-    """A part that an earlier run computed."""
-
-    result: xr.Dataset
-
-    def __call__(self) -> xr.Dataset:
-        """Return the result."""
-        return self.result
 
 
 def without(result: xr.Dataset, names: Iterable[str]) -> xr.Dataset:
@@ -197,15 +130,26 @@ def stage_work(
     return _split(stage, partial(call, row.function, crack), options, nodes)
 
 
-def map_reader(stage: Stage, scene: Scene) -> MapReader:
-    """Return the function of a map that a stage stands for."""
-    return MapReader(stage.row.function, stage.row.reads, call_options(scene, stage.row, stage.keep))
+def map_reader(stage: Stage, scene: Scene) -> Reader:
+    """Return the function of a map that a stage stands for; it takes the result that has the map."""
+    options = call_options(scene, stage.row, stage.keep)
+    return partial(_read_map, stage.row.function, stage.row.reads, options)
 
 
-def reader_of(stage: Stage, scene: Scene, results: Results) -> MapReader | ReaderOfSignature:
-    """Return the function of a part that a stage stands for, which follows another one."""
+def reader_of(stage: Stage, scene: Scene, results: Results) -> Reader:
+    """Return the function of a part that a stage stands for, which follows another one.
+
+    What follows the signature reads all maps, and takes the signature, which it would compute again.
+    """
     reader = map_reader(stage, scene)
-    return ReaderOfSignature(reader, results[stage.needs[0]]) if stage.follows == SIGNATURE else reader
+    return partial(reader, results[stage.needs[0]]) if stage.follows == SIGNATURE else reader
+
+
+def _read_map(
+    function: str, variable: str, options: dict[str, Any], source: xr.Dataset, signature: Any = None
+) -> xr.Dataset:
+    given = {} if signature is None else {"signature": signature}
+    return call(function, with_provenance(source, variable), **options, **given)
 
 
 def _lower_face(scene: Scene, face: xr.DataArray | None) -> xr.Dataset:

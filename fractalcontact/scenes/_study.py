@@ -7,6 +7,7 @@ its own random stream, so that it can be generated wherever its study runs. Many
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Hashable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
@@ -24,7 +25,7 @@ from fractalcontact.base.study import MEMBER
 from fractalcontact.scenes import _parts
 from fractalcontact.scenes._executor import Workers, run_tasks
 from fractalcontact.scenes._inputs import plane_share, surface_grid
-from fractalcontact.scenes._parts import PartWithReaders, Precomputed, StageWork, concatenate
+from fractalcontact.scenes._parts import StageWork, concatenate
 from fractalcontact.scenes._results_folder import PartStore, digest
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._stages import FIGURES, STAGES, Stage, stages_of
@@ -34,9 +35,14 @@ _Results = tuple[list[xr.Dataset | Exception], list[float]]
 
 @dataclass(frozen=True, repr=False)
 class _PartTask:
-    """A part of a stage with the stages that read it, and the keys under which their results are kept."""
+    """A part of a stage with the stages that read its result, and the keys under which results are kept.
 
-    part: PartWithReaders
+    Each of the `calls` but the first one takes the result of the part; of that, maps that nothing else needs
+    are `dropped` afterwards. What fails has its error as result: the others are kept.
+    """
+
+    calls: tuple[_parts.Reader, ...]
+    dropped: tuple[str, ...]
     stages: tuple[str, ...]
     keys: tuple[str, ...]
 
@@ -44,11 +50,28 @@ class _PartTask:
         """Return the results and the seconds each took; None if a stop was requested before it began."""
         if stop:
             return None
-        results, seconds = self.part()
+        results: list[xr.Dataset | Exception] = []
+        seconds = []
+        for call in self.calls:
+            start = time.perf_counter()
+            results.append(_attempted(call, *results[:1]))
+            seconds.append(time.perf_counter() - start)
+        if isinstance(results[0], xr.Dataset):
+            results[0] = _parts.without(results[0], self.dropped)
         for key, result in zip(self.keys, results, strict=False):
             if isinstance(result, xr.Dataset):
                 store.put(key, result)
         return results, seconds
+
+
+def _attempted(call: _parts.Reader, *source: xr.Dataset | Exception) -> xr.Dataset | Exception:
+    """Return the result of a call, or the error that it, or the call before it, ended with."""
+    if source and isinstance(source[0], Exception):
+        return source[0]
+    try:
+        return call(*source)
+    except Exception as error:
+        return error
 
 
 @dataclass(frozen=True, repr=False)
@@ -237,10 +260,9 @@ class Study:
                 continue
             kept = self.parts[stage.name].get(number)
             if kept is not None and all(name in kept for name in stage.keep):
-                part = Precomputed(kept)
+                part = kept.copy  # computed by an earlier run
             keys = tuple(self._key(name, number) for name in kept_names)
-            task = _PartTask(PartWithReaders(part, functions, stage.dropped), names, keys)
-            tasks[stage.name, number] = task
+            tasks[stage.name, number] = _PartTask((part, *functions), stage.dropped, names, keys)
         return tasks
 
     def _key(self, name: str, number: int) -> str:
