@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -188,10 +189,10 @@ def stage_options(scene: Scene, row: StageType) -> dict[str, Any]:
     if row.one_load:
         load = loads_of(scene, row)[:1]
         options = {key: value for key, value in options.items() if key not in LOADS or key in load}
-    needed = row.needed()
-    for key in FROM_MATERIAL:
-        if key not in options and (key in needed or (key == "hardness" and key in row.arguments())):
-            options |= _from_material(scene.material, key)
+    wanted = {*row.needed(), *({"hardness"} & set(row.arguments()))} - set(options)
+    for key, (sources, make) in FROM_MATERIAL.items():
+        if key in wanted and all(getattr(scene.material, source) is not None for source in sources):
+            options[key] = make(scene.material)
     if "methods" in row.arguments():
         options["methods"] = list(scene.want.dimensions)
     return {**options, **row.fixed}
@@ -232,14 +233,12 @@ def contact_modulus(material: MaterialTable) -> float:
     return effective_modulus(*_bodies(material))
 
 
-def _poisson(material: MaterialTable) -> float | None:
+def _poisson(material: MaterialTable) -> float:
     """Return Poisson's ratio; of two materials that of the pair."""
-    if isinstance(material.poisson, (int, float)):
-        return material.poisson
-    if material.young is None:
-        return None
     from fractalcontact.contact import effective_poisson
 
+    if isinstance(material.poisson, (int, float)):
+        return material.poisson
     return effective_poisson(*_bodies(material))
 
 
@@ -249,27 +248,16 @@ def _bodies(material: MaterialTable) -> tuple[float, float, float, float]:
     return float(young[0]), float(poisson[0]), float(young[1]), float(poisson[1])
 
 
-def _friction_angle(material: MaterialTable) -> float | None:
-    return material.basic_friction_angle  # there is no residual one in a scene
-
-
-def _friction_coefficient(material: MaterialTable) -> float:
-    return math.tan(math.radians(float(material.basic_friction_angle or 0.0)))
-
-
 # arguments that the material gives: the keys they are made from, and how
-FROM_MATERIAL: dict[str, tuple[tuple[str, ...], Callable[[MaterialTable], float | None]]] = {
+FROM_MATERIAL: dict[str, tuple[tuple[str, ...], Callable[[MaterialTable], Any]]] = {
     "contact_modulus": (("young", "poisson"), contact_modulus),
     "poisson": (("poisson",), _poisson),
-    "friction_coefficient": (("basic_friction_angle",), _friction_coefficient),
-    "residual_friction_angle": (("basic_friction_angle",), _friction_angle),
-    "basic_friction_angle": (("basic_friction_angle",), _friction_angle),
-    "hardness": (("hardness",), lambda material: material.hardness),
+    "friction_coefficient": (
+        ("basic_friction_angle",),
+        lambda material: math.tan(math.radians(material.basic_friction_angle or 0.0)),
+    ),
+    # there is no residual one in a scene
+    "residual_friction_angle": (("basic_friction_angle",), attrgetter("basic_friction_angle")),
+    "basic_friction_angle": (("basic_friction_angle",), attrgetter("basic_friction_angle")),
+    "hardness": (("hardness",), attrgetter("hardness")),
 }
-
-
-def _from_material(material: MaterialTable, argument: str) -> dict[str, float]:
-    """Return an argument that the material gives, nothing where it lacks a constant for it."""
-    keys, make = FROM_MATERIAL[argument]
-    value = make(material) if all(getattr(material, key) is not None for key in keys) else None
-    return {} if value is None else {argument: value}
