@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,32 +47,33 @@ def read_headers(path: str | os.PathLike[str], read: Callable[[str], bool]) -> d
     with Problems(where, UnreadableFile) as problems:
         problems.file("path", path)
     source = Path(path)
-    groups: dict[str, Header] = {}
-
-    def walk(group: Any, name_of_group: str) -> None:
-        groups[name_of_group or "/"] = Header(
-            dict(group.__dict__),
-            {
-                str(name): (_sizes(variable), dict(variable.__dict__))
-                for name, variable in group.variables.items()
-            },
-            {
-                str(name): variable[...]
-                for name, variable in group.variables.items()
-                if getattr(variable.dtype, "kind", "O") in "biufOS" and read(str(name))
-            },
-        )
-        for name, child in group.groups.items():
-            walk(child, f"{name_of_group}/{name}")
-
     with reading(where, source):
         require_checksum(where, source)
     try:
         with NETCDF_LOCK, netCDF4.Dataset(source) as file:
-            walk(file, "")
+            return {group.path: _header(group, read) for group in groups_in(file)}
     except (OSError, RuntimeError, ValueError) as error:  # the last for names that are not UTF-8
         raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
-    return groups
+
+
+def groups_in(group: Any) -> Iterator[Any]:
+    """Yield a group of a NetCDF file and all groups in it."""
+    yield group
+    for child in group.groups.values():
+        yield from groups_in(child)
+
+
+def _header(group: Any, read: Callable[[str], bool]) -> Header:
+    variables = {str(name): variable for name, variable in group.variables.items()}
+    return Header(
+        dict(group.__dict__),
+        {name: (_sizes(variable), dict(variable.__dict__)) for name, variable in variables.items()},
+        {
+            name: variable[...]
+            for name, variable in variables.items()
+            if getattr(variable.dtype, "kind", "O") in "biufOS" and read(name)
+        },
+    )
 
 
 def _sizes(variable: Any) -> dict[str, int]:

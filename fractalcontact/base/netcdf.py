@@ -11,6 +11,7 @@ one lock of the process is held for the whole file, and xarray gets a file that 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import shutil
 from collections.abc import Iterator, Mapping
@@ -21,6 +22,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import InvalidInput, UnreadableFile, require_library
+from fractalcontact.base.file_contents import groups_in
 from fractalcontact.base.files import (
     DAMAGED,
     NETCDF_LOCK,
@@ -115,13 +117,12 @@ class GrowingFile:
         with Problems(SAVE) as problems:
             for name, dataset in groups.items():
                 _check_words(problems, name, dataset)
+        self.add_groups(groups)
+
+    def add_groups(self, groups: Mapping[str, xr.Dataset]) -> None:
+        """Write groups of another file."""
         with _writing(self.target):
             _write(groups, self.file)
-
-    def add_group(self, name: str, dataset: xr.Dataset) -> None:
-        """Write a group of another file."""
-        with _writing(self.target):
-            _write({name: dataset}, self.file)
 
     def __exit__(self, *error: Any) -> None:
         with _writing(self.target):
@@ -199,8 +200,9 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     with Problems(where, UnreadableFile) as problems:
         problems.file("path", path)
         expected = "'auto', a size of blocks, or a mapping of dims to sizes"
-        are_sizes = chunks is None or _is_size(chunks) or _are_sizes(chunks)
-        problems.require(are_sizes, "chunks", expected, chunks)
+        sizes = dict(chunks) if isinstance(chunks, Mapping) else {"": chunks}
+        are_sizes = all(isinstance(dim, str) and _is_size(size) for dim, size in sizes.items())
+        problems.require(chunks is None or are_sizes, "chunks", expected, chunks)
     if chunks is not None:
         require_library("chunks", "dask", "dask")
     source = Path(path)
@@ -301,10 +303,10 @@ def _read(path: Path, dims: frozenset[str] = frozenset()) -> dict[str, xr.Datase
         require_checksum("fractalcontact.open", path)
     groups = {}
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
-        unpacked = sum(_unpacked_size(group) for group in _groups(file))
+        unpacked = sum(map(_unpacked_size, groups_in(file)))
         limit = unpacked_limit(path.stat().st_size, 250)  # contact maps are packed to a hundredth
         require_unpacked("fractalcontact.open", path.name, unpacked, limit)
-        for group in _groups(file):
+        for group in groups_in(file):
             store = NetCDF4DataStore(file, group=group.path, lock=False)  # type: ignore[no-untyped-call]
             # `open_dataset` would import every library on this machine that adds a file format to xarray
             stored = xr.decode_cf(store)
@@ -320,7 +322,7 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
     from xarray.backends import NetCDF4DataStore
 
     with NETCDF_LOCK, netCDF4.Dataset(path) as file:
-        names = [group.path for group in _groups(file)]
+        names = [group.path for group in groups_in(file)]
     groups = {}
     for name in names:
         store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
@@ -342,25 +344,10 @@ def _is_size(size: object) -> bool:
     return isinstance(size, int) and not isinstance(size, bool) and (size > 0 or size == -1)
 
 
-def _are_sizes(chunks: object) -> bool:
-    return isinstance(chunks, Mapping) and all(
-        isinstance(dim, str) and _is_size(size) for dim, size in chunks.items()
-    )
-
-
 def _unpacked_size(group: Any) -> int:
     """Return the bytes of the arrays of one group of a NetCDF file in memory."""
-    return sum(
-        int(np.prod(variable.shape, dtype=object)) * getattr(variable.dtype, "itemsize", 1)
-        for variable in group.variables.values()
-    )
-
-
-def _groups(group: Any) -> Iterator[Any]:
-    """Yield a group of a NetCDF file and all groups in it."""
-    yield group
-    for child in group.groups.values():
-        yield from _groups(child)
+    sizes = ((v.shape, getattr(v.dtype, "itemsize", 1)) for v in group.variables.values())
+    return sum(math.prod(shape) * size for shape, size in sizes)
 
 
 def _failure_reason(folder: Path, error: Exception) -> str:

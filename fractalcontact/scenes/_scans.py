@@ -137,11 +137,11 @@ class ScanStudies:
             self.reasons[name] = NO_ACCESS if numbers else reason
             return
         if not self.numbers:  # the groups of all scans come before those of each
-            for path in (OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars)):
-                file.add_group(f"/{path}", xr.Dataset())
+            paths = (OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars))
+            file.add_groups({f"/{path}": xr.Dataset() for path in paths})
         self.reasons[name], self.numbers[name] = reason, numbers
-        for path, maps in groups_over(result, MAP_DIMS).items():
-            file.add_group(f"/{SCANS}/{result.parent.name}{path}", maps)
+        place = f"/{SCANS}/{result.parent.name}"
+        file.add_groups({place + path: maps for path, maps in groups_over(result, MAP_DIMS).items()})
 
     def _sources(self) -> Iterator[Path]:
         for scene in self.scans.values():
