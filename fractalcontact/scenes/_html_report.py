@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -113,12 +113,14 @@ def report(
         ):
             for figure in figures:
                 problems.file("figures", figure)
-    tree = result if isinstance(result, xr.DataTree) else _study(result)
-    tree = tree.filter(lambda node: not node.path.startswith(f"/{SCANS}/"))  # each has a page of its own
+    tree = result if isinstance(result, xr.DataTree) else open_result(result)
     target = Path(path) if path is not None else Path(str(result)).with_name(REPORT)
     with Problems(WHERE) as problems:
+        found = f"a {type(tree).__name__}"
+        problems.require(isinstance(tree, xr.DataTree), "result", "the file of a study", found)
         is_free = not target.is_file() or is_report(target)
         problems.require(is_free, "path", "a new file, or a report of this package", target.name)
+    tree = tree.filter(lambda node: not node.path.startswith(f"/{SCANS}/"))  # each has a page of its own
     with writing(WHERE, "path", target), tempfile.TemporaryDirectory() as folder:
         files: Sequence[str | os.PathLike[str]] | None = figures
         if files is None:
@@ -154,14 +156,6 @@ def write_report(
     return target
 
 
-def _study(path: str | os.PathLike[str]) -> xr.DataTree:
-    tree = open_result(path)
-    with Problems(WHERE) as problems:
-        found = type(tree).__name__
-        problems.require(isinstance(tree, xr.DataTree), "result", "the file of a study", f"a {found}")
-    return tree  # type: ignore[no-any-return]
-
-
 def page_contents(tree: xr.DataTree) -> dict[str, Any]:
     """Return what the page shows beside the figures and the summary: the surface, the maps and the curves."""
     single = of_member(tree, 0)
@@ -180,9 +174,9 @@ def _page(
     target: Path,
 ) -> str:
     """Return the text of the page."""
-    pages = {name: page for name in _scans(tree) if (target.parent / (page := page_of(name))).is_file()}
-    entry = provenance_of(tree)
-    scene = scene_of(tree)
+    overview, scene = group_of(tree, OVERVIEW), scene_of(tree)
+    scans = [] if overview is None else map(str, overview[SCAN].values)
+    pages = {name: page for name in scans if (target.parent / (page := page_of(name))).is_file()}
     written = str(tree.attrs.get("history", "")).split(" ")[0]
     subtitle = (tree.attrs.get("source", ""), written, tree.attrs.get("completeness", ""))
     return packaged_template("report_template.html", autoescape=True).render(
@@ -198,24 +192,19 @@ def _page(
         written_rows=written_rows,
         pages=pages,
         scene=_as_json(scene) if scene else "",
-        provenance=_as_json(entry),
+        provenance=_as_json(provenance_of(tree)),
         references=str(tree.attrs.get("references", "")),
         **contents,
     )
 
 
-def _scans(tree: xr.DataTree) -> list[str]:
-    """Return the names of the scans of a study."""
-    overview = group_of(tree, OVERVIEW)
-    return [] if overview is None else [str(name) for name in overview[SCAN].values]
-
-
 def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:
-    """Return what the page draws of the surface: 16-bit levels, lengths in metres, and words.
+    """Return what the page draws of the first surface: 16-bit levels, lengths in metres, and words.
 
     It has at most `most` points along its longer side: 44 kB in the page.
     """
-    height = _heights(tree)
+    heights = (node["height"] for node in tree.subtree if "height" in node.data_vars)
+    height = next((height for height in heights if height.dims == CORE_DIMS), None)
     if height is None:
         return None
     block = math.ceil(max(height.shape) / most)
@@ -245,29 +234,7 @@ def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:
     }
 
 
-def _heights(tree: xr.DataTree) -> xr.DataArray | None:
-    """Return the first surface that the study stores, None if it stores none."""
-    for node in tree.subtree:
-        if "height" in node.data_vars and node["height"].dims == CORE_DIMS:
-            return node["height"]
-    return None
-
-
-@dataclass(frozen=True)
-class Maps:
-    """A set of maps: its title, its key of colours by meaning, and what the page needs to show them.
-
-    `signature` is that of the states on the maps, where the study has it.
-    """
-
-    title: str
-    key: dict[str, str]
-    block: int
-    data: dict[str, Any]
-    signature: dict[str, Any] | None
-
-
-def _maps(tree: xr.DataTree) -> Iterator[Maps]:
+def _maps(tree: xr.DataTree) -> Iterator[dict[str, Any]]:
     """Yield every set of maps of flags that the study stores."""
     for node in tree.subtree:
         for name, variable in node.data_vars.items():
@@ -275,8 +242,12 @@ def _maps(tree: xr.DataTree) -> Iterator[Maps]:
                 yield _map_set(tree, node.path.strip("/"), node.to_dataset(), str(name))
 
 
-def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most: int = 120) -> Maps:
-    """Return at most `most` maps of a variable: at 2 bits for each cell no more than 7 MB in the page."""
+def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most: int = 120) -> dict[str, Any]:
+    """Return at most `most` maps of a variable: at 2 bits for each cell no more than 7 MB in the page.
+
+    A set has a title, a key of colours by meaning, what the page needs to show it, and the signature of the
+    states on its maps, where the study has it.
+    """
     state = dataset[name]
     dims = [str(dim) for dim in state.dims[:-2]]
     limit = most if len(dims) < 2 else math.isqrt(most)
@@ -302,7 +273,8 @@ def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most:
     if name == "state" and signature is not None and set(signature["gap_size"].dims) == set(dims):
         own = _signature_view(tree, signature.isel(shown).transpose(*dims, ...))
         data |= {key: own.pop(key) for key in ("curves", "spots", "marks", "rows")}
-    return Maps(f"{long_name}: {path.replace('/', ', ').replace('_', ' ')}", key, block, data, own)
+    title = f"{long_name}: {path.replace('/', ', ').replace('_', ' ')}"
+    return {"title": title, "key": key, "block": block, "data": data, "signature": own}
 
 
 def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
