@@ -137,37 +137,34 @@ def template(
         if surface is not None:
             problems.surface("surface", surface, finite=False, smallest=1, leading=True)
     facts = _facts(_first_surface(scan, options) if surface is None else surface)
-    prepared: dict[str, Any] = {"despike": True} if despike else {}
+    if despike:
+        options["despike"] = True
     if is_pressed and (despike or facts["missing"]):
-        prepared["fill"] = True
+        options["fill"] = True
     if not is_joint and (level is not None or not (facts["periodic"] or facts["in_plane"])):
-        prepared["level"] = 1 if level is None else level
-    faces = {"surface": _file_table(scan, folder, options | prepared)}
+        options["level"] = 1 if level is None else level
+    faces, names = {"surface": _file_table(scan, folder, options)}, [_words(scan)]
+    material: dict[str, float | None] = {"young": young, "poisson": poisson} if is_pressed else {}
     if is_joint:
         if facts["of_points"]:  # the second face on the plane and the cells of the first
-            options = {key: value for key, value in options.items() if key != "spacing"} | {
-                "plane": OF_SURFACE
-            }
-        faces["upper"] = _file_table(upper or "", folder, options | prepared)
-    material: dict[str, float | None] = {}
-    if is_pressed:
-        material = {"young": young, "poisson": poisson}
-    if is_joint:  # true pressures beyond the strength of the walls are named
+            options.pop("spacing", None)
+            options["plane"] = OF_SURFACE
+        faces["upper"] = _file_table(upper or "", folder, options)
+        names.append(_words(upper or ""))
+        # true pressures beyond the strength of the walls are named
         material |= {"basic_friction_angle": friction_angle, "yield_pressure": wall_strength}
-    if is_joint:
         values = _travel(facts)
     else:
         values = _loads(facts, young, poisson) if is_pressed else _roughness(facts)
-    names = [_words(each) for each in ((scan, upper) if is_joint and upper else (scan,))]
-    values["title"] = f"{question.capitalize()} of {' and '.join(dict.fromkeys(names))}"
-    values |= {"turn_upper": turn_upper, "register": register}
-    values["material"] = {key: float(value) for key, value in material.items() if value is not None}
-    return _scene(question=question, faces=faces, **values)
-
-
-def _scene(**values: Any) -> str:
-    """Return the text of a scene."""
-    return packaged_template("question.toml.jinja", keep_trailing_newline=True).render(values)
+    return packaged_template("question.toml.jinja", keep_trailing_newline=True).render(
+        question=question,
+        title=f"{question.capitalize()} of {' and '.join(dict.fromkeys(names))}",
+        faces=faces,
+        material={key: float(value) for key, value in material.items() if value is not None},
+        turn_upper=turn_upper,
+        register=register,
+        **values,
+    )
 
 
 @cache
@@ -225,9 +222,9 @@ def _facts(surface: xr.DataArray) -> dict[str, Any]:
     """Return spacing, extent, rms slope of a surface, and whether it has gaps."""
     from fractalcontact import surfaces
 
-    if "y" not in surface.dims or surface.ndim > 2:
-        if surface.ndim > 2:
-            raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])
+    if surface.ndim > 2:
+        raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])
+    if "y" not in surface.dims:
         message = "scan: expected a surface, got a profile: see fractalcontact.dimensions.estimate"
         raise InvalidInput(WHERE, [message])
     grid, statistics = read_grid(surface), surfaces.describe(surface)
