@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -38,7 +37,7 @@ from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._scene_file import scans_of
 from fractalcontact.scenes._stages import FIGURES, check_memory, stages_of
 from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
-from fractalcontact.scenes._summary import Summary, datasheet, screen_text, summary_of, verbose_text
+from fractalcontact.scenes._summary import Summary, datasheet, summary_of
 from fractalcontact.scenes._validation import implausible_result, validated, warn_of
 
 
@@ -129,7 +128,7 @@ def run(
                 with locked(folder), signals.noted(folder is not None) as stop:
                     tree, whole = _run(scene, folder, progress, among, start, stop, faces=faces)
     if summary:
-        print(_text(tree, whole, verbose=verbose))  # noqa: T201
+        print((whole or summary_of(tree)).text(verbose=verbose))  # noqa: T201
     return tree
 
 
@@ -231,7 +230,10 @@ def _run(
         raise signals.Stopped(
             stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
         )
-    calls = partial(_save_and_draw, tree, scene, folder, progress), partial(_page_and_summary, tree)
+    calls = (
+        lambda: _save_and_draw(tree, scene, folder, progress),
+        lambda: (page_contents(tree), summary_of(tree)),
+    )
     # a copy of this process prepares the page meanwhile
     results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
     figures, (contents, whole) = results[0], results[1]
@@ -261,16 +263,6 @@ def _save_and_draw(tree: xr.DataTree, scene: Scene, folder: Path, progress: bool
     (folder / PARTIAL_RESULT).unlink(missing_ok=True)
     with _beside_the_result():
         return _draw(tree, folder, progress) if scene.want.figures else []
-
-
-def _page_and_summary(tree: xr.DataTree) -> tuple[dict[str, Any], Summary]:
-    return page_contents(tree), summary_of(tree)
-
-
-def _text(tree: xr.DataTree, whole: Summary | None, *, verbose: bool) -> str:
-    """Return the summary as text, from what the report has computed of it."""
-    whole = whole or summary_of(tree)
-    return verbose_text(whole) if verbose else screen_text(whole)
 
 
 def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) -> None:

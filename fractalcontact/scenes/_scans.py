@@ -53,7 +53,7 @@ class _ScanTask:
         try:
             if not self.folder.parent.is_dir():
                 return NO_ACCESS, {}
-            digests = Study(self.scene, PartStore(None), progress=False, workers=None).digests
+            digests = Study(self.scene, PartStore(None)).digests
             digest = digest_of([digests, self.scene.want.figures])
             if _is_finished(self.folder, digest):
                 return "", _numbers(open_result(self.folder / RESULT))

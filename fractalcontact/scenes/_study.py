@@ -11,7 +11,7 @@ import time
 from collections.abc import Hashable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -107,11 +107,14 @@ class StudyResults:
         return [f"{', '.join(names)}: {reason}" for reason, names in stages.items()]
 
 
+@dataclass
 class Study:
     """One run of a scene with one surface: the results so far and the time they took.
 
     Attributes
     ----------
+    faces : mapping
+        The faces of `[surface]` and `[upper]` that were read to validate the scene; others are read here.
     parts : dict
         Results of the finished parts of each stage, by number.
     results : dict
@@ -120,30 +123,32 @@ class Study:
         Seconds that each stage took in this run.
     failures : dict of str to str
         Stages that failed, or need one that did, and why; empty unless the study `goes_on` without them.
-    faces : mapping
-        The faces of `[surface]` and `[upper]` that were read to validate the scene; others are read here.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        store: PartStore,
-        progress: bool,
-        workers: Workers | None,
-        *,
-        goes_on: bool = False,
-        faces: Mapping[str, xr.DataArray] = MappingProxyType({}),
-    ) -> None:
-        self.scene, self.store, self.progress, self.workers = scene, store, progress, workers
-        self.goes_on, self.failures, self.faces = goes_on, dict[str, str](), faces
-        self.plan = stages_of(scene)
-        self.parts: dict[str, dict[int, xr.Dataset]] = {}
-        self.results: dict[str, xr.Dataset] = {}
-        self.spent: dict[str, float] = {}
-        self.digests: dict[str, str] = {}
-        self.works: dict[str, StageWork] = {}
+    scene: Scene
+    store: PartStore
+    progress: bool = False
+    workers: Workers | None = None
+    goes_on: bool = False
+    faces: Mapping[str, xr.DataArray] = field(default_factory=dict)
+    parts: dict[str, dict[int, xr.Dataset]] = field(default_factory=dict)
+    results: dict[str, xr.Dataset] = field(default_factory=dict)
+    spent: dict[str, float] = field(default_factory=dict)
+    failures: dict[str, str] = field(default_factory=dict)
+    works: dict[str, StageWork] = field(default_factory=dict)
+
+    @cached_property
+    def plan(self) -> tuple[Stage, ...]:
+        """The stages."""
+        return stages_of(self.scene)
+
+    @cached_property
+    def digests(self) -> dict[str, str]:
+        """Digests of all that can change the result of a stage, by its name."""
+        digests: dict[str, str] = {}
         for stage in self.plan:
-            self.digests[stage.name] = digest(stage, scene, self.digests)
+            digests[stage.name] = digest(stage, self.scene, digests)
+        return digests
 
     def run(self, stop: signals.Stop) -> StudyResults:
         """Run all stages, or those before a stop was requested.
@@ -181,9 +186,8 @@ class Study:
         of_stages: list[dict[tuple[str, int], _PartTask]] = []
         for stage in (stage for stage in stages if not self._lacks(stage)):
             try:
-                self.works[stage.name] = _parts.stage_work(
-                    stage, self.scene, self.results, self.works, self.faces
-                )
+                work = _parts.stage_work(stage, self.scene, self.results, self.works, self.faces)
+                self.works[stage.name] = work
                 of_stages.append(self._tasks(stage))
             except Exception as error:
                 self._fail(stage.name, error)
@@ -191,19 +195,14 @@ class Study:
         tasks = {key: task for own in sorted(of_stages, key=len) for key, task in own.items()}
         several = len(tasks) > 1
         workers = self.workers if several else None
-        show = self.progress and several
-        # closed after an error too: parts that a copy of this process has begun are kept
+        wide = [(stage.name, 0) for stage in stages if stage.whole_path]  # a thread for each map
         draws = self.store.folder is not None and self.scene.want.figures
-        running = run_tasks(
-            tasks,
-            self.store,
-            stop,
-            workers,
-            points=self._points,
-            wide=[(stage.name, 0) for stage in stages if stage.whole_path],  # a thread for each map
-            meanwhile=_load_plotting if draws else None,
-        )
+        later = _load_plotting if draws else None
+        points = int(self.results["surfaces"]["height"].size) if "surfaces" in self.results else 0
+        running = run_tasks(tasks, self.store, stop, workers, points=points, wide=wide, meanwhile=later)
+        # closed after an error too: parts that a copy of this process has begun are kept
         with closing(running) as finished:
+            show = self.progress and several
             bar = track(finished, show, self.scene.name, unit="part", total=len(tasks))
             for key, (results, seconds) in bar:
                 for name, result, spent in zip(tasks[key].stages, results, seconds, strict=True):
@@ -230,11 +229,6 @@ class Study:
         if not self.goes_on or STAGES[name].takes == "file":
             raise error
         self.failures[name] = reason_of(error)
-
-    @property
-    def _points(self) -> int:
-        """Points of the surface."""
-        return int(self.results["surfaces"]["height"].size) if "surfaces" in self.results else 0
 
     def _load_kept(self, name: str, count: int) -> None:
         """Load the parts of a stage that an earlier run kept."""
@@ -281,13 +275,10 @@ class Study:
         if "surfaces" not in self.results:
             return {}
         height, upper = self.results["surfaces"]["height"], self.results.get("joints/faces")
-        lines = [str(height.attrs.get("preparation", ""))]
-        if upper is not None:
-            lines = [line and f"lower face: {line}" for line in lines]
-            lines += [f"upper face: {upper.attrs['preparation']}"] if "preparation" in upper.attrs else []
-        facts: dict[str, str | float] = {}
-        if text := "; ".join(line for line in lines if line):
-            facts["preparation"] = text
+        faces = {"": height} if upper is None else {"lower face: ": height, "upper face: ": upper}
+        done = {start: face.attrs.get("preparation") for start, face in faces.items()}
+        text = "; ".join(f"{start}{words}" for start, words in done.items() if words)
+        facts: dict[str, str | float] = {"preparation": text} if text else {}
         if self.scene.is_pressed and height.ndim == 2:
             facts["plane_share"] = plane_share(height)
         return facts
@@ -335,7 +326,7 @@ class _MemberTask:
     def _study(self, store: PartStore) -> Study:
         table = {key: value for key, value in self.scene.table("surface").items() if key != "members"}
         tables = {**self.scene.tables, "surface": table | {MEMBER: self.member}}
-        return Study(replace(self.scene, tables=tables), store, progress=False, workers=self.workers)
+        return Study(replace(self.scene, tables=tables), store, workers=self.workers)
 
 
 def study_ensemble(

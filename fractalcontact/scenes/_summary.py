@@ -15,7 +15,7 @@ from fractalcontact.base.tables import Note, table
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._caveats import aperture_as_placed, caveats
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
-from fractalcontact.scenes._result_tree import scan_facts, scan_tables
+from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
 from fractalcontact.scenes._stages import STAGES
 
 MORE = "--verbose and the report have all"
@@ -30,6 +30,10 @@ class Summary:
     tables: list[ResultTable]
     caveats: list[str]
     stages: list[tuple[str, ...]]
+
+    def text(self, *, verbose: bool) -> str:
+        """Return it as text: all of it, or so much as fits a screen."""
+        return _verbose_text(self) if verbose else _screen_text(self)
 
 
 def summary(tree: xr.DataTree, *, verbose: bool = False) -> str:
@@ -60,8 +64,7 @@ def summary(tree: xr.DataTree, *, verbose: bool = False) -> str:
     with Problems("fractalcontact.scenes.summary") as problems:
         problems.tree("tree", tree)
         problems.boolean("verbose", verbose)
-    whole = summary_of(tree)
-    return verbose_text(whole) if verbose else screen_text(whole)
+    return summary_of(tree).text(verbose=verbose)
 
 
 def summary_of(tree: xr.DataTree) -> Summary:
@@ -75,10 +78,8 @@ def facts(tree: xr.DataTree) -> list[str]:
     members = member_count(tree)
     ensemble = [f"ensemble of {members} members: mean ± standard deviation over the members"]
     preparation = str(tree.attrs.get("preparation", ""))
-    lines = [*scan_facts(tree), *(ensemble if members else [])] + [
-        line for line in preparation.split("; ") if line
-    ]
-    return [*lines, *_openings(tree)]
+    done = filter(None, preparation.split("; "))
+    return [*scan_facts(tree), *(ensemble if members else []), *done, *_openings(tree)]
 
 
 def _openings(tree: xr.DataTree) -> Iterator[str]:
@@ -96,11 +97,9 @@ def _openings(tree: xr.DataTree) -> Iterator[str]:
 
 def _tables(tree: xr.DataTree) -> Iterator[ResultTable]:
     """Yield the table of every stage that the study has a result of; of many scans first a row for each."""
-    of_scans = list(scan_tables(tree))
-    yield from of_scans
-    if of_scans:  # each has a page of its own for the rest
-        return
-    yield from stage_tables(tree, STAGES)
+    yield from scan_tables(tree)
+    if group_of(tree, OVERVIEW) is None:  # of many scans, each has a page of its own for the rest
+        yield from stage_tables(tree, STAGES)
 
 
 def stage_tables(tree: xr.DataTree, names: Iterable[str]) -> Iterator[ResultTable]:
@@ -137,7 +136,7 @@ def _fit(one: ResultTable, other: ResultTable) -> bool:
     )
 
 
-def screen_text(whole: Summary, lines: int = 36, most: int = 3) -> str:
+def _screen_text(whole: Summary, lines: int = 36, most: int = 3) -> str:
     """Return a summary in so many lines: results first, then at most `most` of the caveats.
 
     A command adds what it has written, 40 lines in all.
@@ -180,7 +179,7 @@ def _as_line(one_row: ResultTable) -> Note:
     return Note(f"{one_row.title}: {cells}", indent=0)
 
 
-def verbose_text(whole: Summary) -> str:
+def _verbose_text(whole: Summary) -> str:
     """Return all of a summary as text."""
     sections = ["\n".join([whole.title, *(str(Note(fact, indent=0)) for fact in whole.facts)])]
     for each in whole.tables:
