@@ -8,23 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.scenes._result_tables import (
-    Column,
-    Remarks,
-    Rows,
-    at_value,
-    finite,
-    length,
-    no_remarks,
-    plain,
-    rows,
-)
-from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType
-
-
-def _set(title: str, *columns: Column, remarks: Remarks = no_remarks) -> Rows:
-    """Return the table of an analysis of contact sets: over the shears, or over the load."""
-    return rows(title, ("shear", "step"), *columns, remarks=remarks, first_dim=True)
+from fractalcontact.scenes._result_tables import Column, at_value, finite, length, plain
+from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, stage_type
 
 
 def _window(state: xr.Dataset) -> str | None:
@@ -63,16 +48,6 @@ def _beside_null(name: str, null: str) -> Any:
         return plain(state[name], 2) + (f" ({plain(state[null], 2)})" if null in state else "")
 
     return write
-
-
-def _set_dimension(name: str, words: str) -> Rows:
-    return _set(
-        words,
-        Column(f"{words} D (random)", _beside_null(name, "null_dimension")),
-        Column("over", _window),
-        Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
-        remarks=_beside_random,
-    )
 
 
 def _middle_box(state: xr.Dataset) -> str | None:
@@ -120,93 +95,103 @@ def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
 
 
 SIGNATURE = "domains/signature"
-SIGNATURE_TABLE = _set(
-    "signature of the contact set",
-    Column("spot", "spot_size"),
-    Column("gap", "gap_size"),
-    Column("D (random spots)", _window_dimension),
-    Column("clustering", _longest_scale("clustering"), 2),
-    Column("patch", _longest_scale("integral_range")),
-    Column("lacunarity x : y", _longest_scale("lacunarity_ratio"), 2, screen=False),
-    remarks=_signature_window,
-)
+OVER = ("shear", "step")  # a table has rows over the shears, or over the load
 
 
-def _domain(name: str, rows: Rows | None = None, needs: tuple[str, ...] = (), **more: Any) -> StageType:
-    source = ("contact or joints/closure", *needs)
-    table = f"domains.{name}"
-    return StageType(f"domains/{name}", source, table, table, table, "map", reads="state", rows=rows, **more)
+def _domain(
+    name: str, title: str = "", *columns: Column, needs: tuple[str, ...] = (), **more: Any
+) -> StageType:
+    options: dict[str, Any] = {
+        "table": f"domains.{name}",
+        "wanted": f"domains.{name}",
+        "first_dim": True,
+    } | more
+    source, function = ("contact or joints/closure", *needs), f"domains.{name}"
+    return stage_type(
+        f"domains/{name}", source, function, title, OVER, *columns, takes="map", reads="state", **options
+    )
+
+
+def _set_dimension(name: str, words: str, **more: Any) -> StageType:
+    return _domain(
+        name,
+        words,
+        Column(f"{words} D (random)", _beside_null(name, "null_dimension")),
+        Column("over", _window),
+        Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
+        remarks=_beside_random,
+        **more,
+    )
 
 
 STAGES = (
     # one window of lengths for all states
-    _domain("signature", SIGNATURE_TABLE, whole_path=True),
-    _domain("box_dimension", _set_dimension("box_dimension", "box"), whole_path=True),
+    _domain(
+        "signature",
+        "signature of the contact set",
+        Column("spot", "spot_size"),
+        Column("gap", "gap_size"),
+        Column("D (random spots)", _window_dimension),
+        Column("clustering", _longest_scale("clustering"), 2),
+        Column("patch", _longest_scale("integral_range")),
+        Column("lacunarity x : y", _longest_scale("lacunarity_ratio"), 2, screen=False),
+        remarks=_signature_window,
+        whole_path=True,
+    ),
+    _set_dimension("box_dimension", "box", whole_path=True),
     _domain("box_counts"),
-    _domain("minkowski_dimension", _set_dimension("minkowski_dimension", "Minkowski")),
-    _domain("correlation_dimension", _set_dimension("correlation_dimension", "correlation")),
+    _set_dimension("minkowski_dimension", "Minkowski"),
+    _set_dimension("correlation_dimension", "correlation"),
     _domain(
         "generalised_dimensions",
-        _set(
-            "generalised dimensions",
-            *(
-                Column(f"D_{order}", at_value("generalised_dimension", "moment_order", order), 2)
-                for order in (0, 1, 2)
-            ),
+        "generalised dimensions",
+        *(
+            Column(f"D_{order}", at_value("generalised_dimension", "moment_order", order), 2)
+            for order in (0, 1, 2)
         ),
     ),
-    _domain("boundary_dimension", _set_dimension("boundary_dimension", "boundary")),
+    _set_dimension("boundary_dimension", "boundary"),
     _domain(
         "lacunarity",
-        _set(
-            "lacunarity",
-            Column("lacunarity (random)", _beside_null("lacunarity", "null_lacunarity")),
-            Column("boxes", _middle_box),
-        ),
+        "lacunarity",
+        Column("lacunarity (random)", _beside_null("lacunarity", "null_lacunarity")),
+        Column("boxes", _middle_box),
     ),
     _domain(
         "islands",
-        _set(
-            "islands",
-            Column("islands", "n_islands", 0),
-            Column("largest island", "largest_island"),
-            Column("mean area", "mean_island_area", screen=False),
-        ),
+        "islands",
+        Column("islands", "n_islands", 0),
+        Column("largest island", "largest_island"),
+        Column("mean area", "mean_island_area", screen=False),
         keeps=(ISLAND_MAP,),
         whole_path=True,
     ),
     _domain(
         "percolation",
-        _set(
-            "percolation",
-            Column("contacts cross", _crosses),
-            Column("largest share", "largest_share"),
-        ),
+        "percolation",
+        Column("contacts cross", _crosses),
+        Column("largest share", "largest_share"),
     ),
     _domain("hausdorff_content"),
     _domain(
         "describe",
-        _set(
-            "contact set",
-            Column("islands", "n_islands", 0),
-            Column("box D (random)", _beside_null("box_dimension", "null_dimension")),
-            Column("D over the window", _window_dimension),
-            Column("clustering", _longest_scale("clustering"), 2),
-            Column("contacts cross", _crosses, screen=False),
-        ),
+        "contact set",
+        Column("islands", "n_islands", 0),
+        Column("box D (random)", _beside_null("box_dimension", "null_dimension")),
+        Column("D over the window", _window_dimension),
+        Column("clustering", _longest_scale("clustering"), 2),
+        Column("contacts cross", _crosses, screen=False),
         whole_path=True,
     ),
     _domain(
         "evolution",
-        _set(
-            "evolution",
-            Column("births", "births", 0),
-            Column("deaths", "deaths", 0),
-            Column("merges", "merges", 0),
-            Column("splits", "splits", 0),
-            Column("D (random spots)", _window_dimension, screen=False),
-            remarks=_signature_window,
-        ),
+        "evolution",
+        Column("births", "births", 0),
+        Column("deaths", "deaths", 0),
+        Column("merges", "merges", 0),
+        Column("splits", "splits", 0),
+        Column("D (random spots)", _window_dimension, screen=False),
+        remarks=_signature_window,
         needs=(SIGNATURE,),
         whole_path=True,
     ),

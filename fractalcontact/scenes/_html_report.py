@@ -29,11 +29,12 @@ from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.study import group_of, member_count, of_member, provenance_of, scene_of
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
-from fractalcontact.scenes._domain_stages import SIGNATURE, SIGNATURE_TABLE
+from fractalcontact.scenes._domain_stages import SIGNATURE
 from fractalcontact.scenes._export import tables
 from fractalcontact.scenes._result_tables import SCAN, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, pictured
 from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page_of
+from fractalcontact.scenes._stages import STAGES
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 from fractalcontact.scenes._template import packaged_template
 
@@ -313,7 +314,8 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
     window = across(np.array([signature[name].values for name in ("window_low", "window_high")]))
     decades = 10.0 ** np.arange(-3, 6)[:, None] * (1.0, 2.0, 5.0)
     written = [value for value in decades.ravel() if side[0] <= value * scale.factor <= side[-1]]
-    rows = table_of(replace(SIGNATURE_TABLE, first_dim=False), tree, signature)
+    table = STAGES[SIGNATURE].rows
+    rows = table and table_of(replace(table, first_dim=False), tree, signature)
     cells = [list(zip(rows.heads, row, strict=True)) for row in rows.cells] if rows else []
     return {
         "curves": polylines(local),

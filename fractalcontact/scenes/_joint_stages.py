@@ -12,7 +12,6 @@ from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
 from fractalcontact.scenes._result_tables import (
     Column,
-    Rows,
     amount,
     are_one,
     at_value,
@@ -20,10 +19,9 @@ from fractalcontact.scenes._result_tables import (
     in_turn,
     length,
     plain,
-    rows,
 )
 from fractalcontact.scenes._scene import LOADS
-from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType
+from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType, stage_type
 from fractalcontact.scenes._surface_stages import AREAS, SLIP_TABLE, SURFACE
 
 OUTSIDE_SCALE = (
@@ -76,10 +74,6 @@ def _last_pressure(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the pressure on the block at the last step, where it is the same for all shears."""
     if are_one(finite(last["nominal_pressure"])):
         yield f"at the last step of the load, {amount(last['nominal_pressure'])} on the area of the block"
-
-
-def _greatest_shear(state: xr.Dataset) -> Any:
-    return state["shear"] if "shear" in state.coords else None
 
 
 def _mean_slope(state: xr.Dataset) -> str | None:
@@ -153,10 +147,6 @@ def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
 
 def _peak_distance(state: xr.Dataset) -> str | None:
     return length(state["peak_distance"].max()) if "peak_distance" in state else None
-
-
-def _worn_depth(state: xr.Dataset) -> Any:
-    return state["wear_depth"].max("point", keep_attrs=True) if "wear_depth" in state else None
 
 
 def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:
@@ -297,75 +287,64 @@ JRC_COLUMN = Column("JRC", _jrc, 1)
 
 
 def _joint(
-    name: str, rows: Rows | None = None, needs: tuple[str, ...] = FACES, function: str = "", **more: Any
+    name: str, *table: Any, needs: tuple[str, ...] = FACES, function: str = "", **more: Any
 ) -> StageType:
-    options: dict[str, Any] = {"takes": "crack"} | more
-    function = f"joints.{function or name}"
-    return StageType(
-        f"joints/{name}", needs, function, f"joint.{name}", f"joints.{name}", rows=rows, **options
-    )
+    own, options = f"joint.{name}", {"takes": "crack", "wanted": f"joints.{name}"} | more
+    return stage_type(f"joints/{name}", needs, f"joints.{function or name}", *table, table=own, **options)
 
 
-def _of_surface(name: str, rows: Rows, **more: Any) -> StageType:
-    return _joint(name, rows, SURFACE, takes="surface", **more)
+def _of_surface(name: str, *table: Any, **more: Any) -> StageType:
+    return _joint(name, *table, needs=SURFACE, takes="surface", **more)
 
 
-def _of_gap(name: str, **more: Any) -> StageType:
-    return _joint(name, needs=("joints/closure",), takes="map", reads="gap", **more)
+def _of_gap(name: str, *table: Any, **more: Any) -> StageType:
+    return _joint(name, *table, needs=("joints/closure",), takes="map", reads="gap", **more)
 
 
 STAGES = (
-    StageType(
+    stage_type(
         "joints/faces",
         SURFACE,
         "joints.register",
-        "upper",
+        "mated position of the upper face",
+        (),
+        Column("shift along x", "shift_x"),
+        Column("shift along y", "shift_y"),
+        Column("rotation", "rotation"),
+        Column("mismatch, rms", "mismatch"),
+        Column("correlation", "correlation", 3),
+        table="upper",
         takes="file",
-        rows=rows(
-            "mated position of the upper face",
-            (),
-            Column("shift along x", "shift_x"),
-            Column("shift along y", "shift_y"),
-            Column("rotation", "rotation"),
-            Column("mismatch, rms", "mismatch"),
-            Column("correlation", "correlation", 3),
-        ),
     ),
-    _joint("delta_surface", None, one_direction=True),
+    _joint("delta_surface", one_direction=True),
     _joint(
         "delta_dimension",
-        rows(
-            "dimension of the delta-surface",
-            ("shear",),
-            Column("D of the delta-surface, by area", "covering_dimension", 3),
-            Column("by variogram", "variogram_dimension", 3, screen=False),
-            Column("by spectrum", "spectrum_dimension", 3, screen=False),
-        ),
+        "dimension of the delta-surface",
+        ("shear",),
+        Column("D of the delta-surface, by area", "covering_dimension", 3),
+        Column("by variogram", "variogram_dimension", 3, screen=False),
+        Column("by spectrum", "spectrum_dimension", 3, screen=False),
         one_direction=True,
     ),
     _joint(
         "rigid_dilatancy",
-        rows(
-            "rigid dilatancy",
-            ("direction",),
-            Column("shear", _greatest_shear),
-            Column("rigid dilatancy", "rigid_dilatancy"),
-            Column("slope of face", _mean_slope),
-        ),
+        "rigid dilatancy",
+        ("direction",),
+        Column("shear", "shear"),
+        Column("rigid dilatancy", "rigid_dilatancy"),
+        Column("slope of face", _mean_slope),
         function="dilatancy",
         keys=("shear", "direction"),
     ),
     _joint(
         "closure",
-        rows(
-            "closure",
-            ("shear",),
-            Column("normal force", "normal_force", screen=False),
-            Column("closure", "closure", screen=False),
-            Column("interface closure", "interface_closure"),
-            *AREAS,
-            remarks=_last_pressure,
-        ),
+        "closure",
+        ("shear",),
+        Column("normal force", "normal_force", screen=False),
+        Column("closure", "closure", screen=False),
+        Column("interface closure", "interface_closure"),
+        *AREAS,
+        remarks=_last_pressure,
         keeps=CONTACT_MAPS,
         splits=("shear", "step"),
         presses=True,
@@ -373,29 +352,25 @@ STAGES = (
     ),
     _joint(
         "closure_laws",
-        rows(
-            "laws of closure",
-            ("shear",),
-            Column("initial stiffness", "initial_stiffness", screen=False),
-            Column("greatest closure", "greatest_closure", screen=False),
-            Column("closure length", "closure_length", screen=False),
-            Column("stiffness", "stiffness", screen=False),
-            Column("preferred law", _preferred_law, screen=False),
-            Column("seating pressure", "seating_pressure", screen=False),
-        ),
-        ("joints/closure",),
+        "laws of closure",
+        ("shear",),
+        Column("initial stiffness", "initial_stiffness", screen=False),
+        Column("greatest closure", "greatest_closure", screen=False),
+        Column("closure length", "closure_length", screen=False),
+        Column("stiffness", "stiffness", screen=False),
+        Column("preferred law", _preferred_law, screen=False),
+        Column("seating pressure", "seating_pressure", screen=False),
+        needs=("joints/closure",),
         takes="result",
         keys=("seating_pressure",),  # its closure is the result of another stage, not a load
     ),
     _joint(
         "elimination",
-        rows(
-            "elimination on a part of the block",
-            ("shear",),
-            Column("part of the block", "nominal_area", screen=False),
-            Column("contact area", "contact_fraction", screen=False),
-            Column("rounds", "iterations", 0, screen=False),
-        ),
+        "elimination on a part of the block",
+        ("shear",),
+        Column("part of the block", "nominal_area", screen=False),
+        Column("contact area", "contact_fraction", screen=False),
+        Column("rounds", "iterations", 0, screen=False),
         function="closure",
         splits=("shear", "step"),
         presses=True,
@@ -407,20 +382,18 @@ STAGES = (
     ),
     _joint(
         "area_by_resolution",
-        rows(
-            "contact area against the spacing",
-            ("shear", "resolution"),
-            Column("normal force", "normal_force", screen=False),
-            Column("contact area", "contact_fraction"),
-            Column("area dimension", "area_dimension", 2),
-        ),
+        "contact area against the spacing",
+        ("shear", "resolution"),
+        Column("normal force", "normal_force", screen=False),
+        Column("contact area", "contact_fraction"),
+        Column("area dimension", "area_dimension", 2),
         splits=("shear",),
         presses=True,
         one_direction=True,
     ),
     _joint(
         PARTIAL_SLIP,
-        SLIP_TABLE,
+        rows=SLIP_TABLE,
         keeps=SLIP_MAPS,
         splits=("shear",),
         presses=True,
@@ -429,14 +402,12 @@ STAGES = (
     ),
     _joint(
         "elastic_dilatancy",
-        rows(
-            "elastic dilatancy",
-            ("direction", "step"),
-            Column("shear", _greatest_shear, screen=False),
-            Column("dilatancy", "dilatancy", screen=False),
-            Column("rigid dilatancy", "rigid_dilatancy", screen=False),
-        ),
-        (*FACES, "joints/closure"),
+        "elastic dilatancy",
+        ("direction", "step"),
+        Column("shear", "shear", screen=False),
+        Column("dilatancy", "dilatancy", screen=False),
+        Column("rigid dilatancy", "rigid_dilatancy", screen=False),
+        needs=(*FACES, "joints/closure"),
         function="dilatancy",
         splits=("direction", "shear"),
         required=("normal_force",),
@@ -444,125 +415,105 @@ STAGES = (
     ),
     _joint(
         "friction",
-        rows(
-            "peak shear strength",
-            ("direction", "step"),
-            Column("peak shear strength", _strength("peak_shear_strength")),
-            Column("peak friction angle", _strength("peak_friction_angle")),
-            Column("from shear", _strength("peak_shear"), screen=False),
-            Column("over", _peak_distance),
-            remarks=_peak_remarks,
-        ),
-        ("joints/elastic_dilatancy or joints/rigid_dilatancy",),
+        "peak shear strength",
+        ("direction", "step"),
+        Column("peak shear strength", _strength("peak_shear_strength")),
+        Column("peak friction angle", _strength("peak_friction_angle")),
+        Column("from shear", _strength("peak_shear"), screen=False),
+        Column("over", _peak_distance),
+        remarks=_peak_remarks,
+        needs=("joints/elastic_dilatancy or joints/rigid_dilatancy",),
         takes="result",
         own=("nominal_pressure",),  # in [joint] it is the load of the closure
     ),
     _of_surface(
         "roughness_coefficient",
-        rows(
-            "joint roughness coefficient (JRC)",
-            ("direction",),
-            JRC_COLUMN,
-            Column("slope Z2", "profile_slope", 3),
-            Column("scatter of the profiles", _jrc_scatter),
-            Column("read every", "lag", screen=False),
-            Column("regression over", "regression_interval", screen=False),
-            remarks=_outside_scale,
-        ),
+        "joint roughness coefficient (JRC)",
+        ("direction",),
+        JRC_COLUMN,
+        Column("slope Z2", "profile_slope", 3),
+        Column("scatter of the profiles", _jrc_scatter),
+        Column("read every", "lag", screen=False),
+        Column("regression over", "regression_interval", screen=False),
+        remarks=_outside_scale,
     ),
     _of_surface(
         "directional_roughness",
-        rows(
-            "directional roughness (Grasselli), theta_max / (C + 1)",
-            (),
-            Column("largest roughness metric", _extreme(np.nanargmax, 1)),
-            Column("smallest roughness metric", _extreme(np.nanargmin, 2)),
-            remarks=_azimuths,
-        ),
+        "directional roughness (Grasselli), theta_max / (C + 1)",
+        (),
+        Column("largest roughness metric", _extreme(np.nanargmax, 1)),
+        Column("smallest roughness metric", _extreme(np.nanargmin, 2)),
+        remarks=_azimuths,
     ),
     _joint(
         "direct_shear",
-        rows(
-            "direct shear",
-            ("nominal_pressure",),
-            Column("peak strength", "peak_shear_strength"),
-            Column("friction angle", "peak_friction_angle"),
-            Column("residual strength", "residual_shear_strength"),
-            Column("worn depth", _worn_depth),
-        ),
+        "direct shear",
+        ("nominal_pressure",),
+        Column("peak strength", "peak_shear_strength"),
+        Column("friction angle", "peak_friction_angle"),
+        Column("residual strength", "residual_shear_strength"),
+        Column("worn depth", lambda state: state["wear_depth"].max("point", keep_attrs=True)),
         splits=("nominal_pressure",),
         one_direction=True,
         presses=True,
     ),
     _of_surface(
         "shear_curve",
-        rows(
-            "shear curve",
-            ("nominal_pressure",),
-            Column("peak strength (shear curve)", "peak_shear_strength"),
-            Column("at displacement", "peak_displacement"),
-        ),
+        "shear curve",
+        ("nominal_pressure",),
+        Column("peak strength (shear curve)", "peak_shear_strength"),
+        Column("at displacement", "peak_displacement"),
         one_direction=True,
     ),
     _of_surface(
         "strength_envelope",
-        rows(
-            "strength by criterion",
-            ("criterion",),
-            Column("shear strength", "shear_strength"),
-            Column("friction angle", "friction_angle", screen=False),
-            Column("in its range", "in_range", screen=False),
-            remarks=_criteria,
-        ),
+        "strength by criterion",
+        ("criterion",),
+        Column("shear strength", "shear_strength"),
+        Column("friction angle", "friction_angle", screen=False),
+        Column("in its range", "in_range", screen=False),
+        remarks=_criteria,
         one_direction=True,
     ),
     _joint(
         "self_weight",
-        rows(
-            "strength under self-weight",
-            ("direction", "shear", "structure_size"),
-            Column("shear strength", _weight_strength),
-            Column("exponent of size", "strength_exponent", 3, screen=False),
-            remarks=_rigid_faces,
-        ),
+        "strength under self-weight",
+        ("direction", "shear", "structure_size"),
+        Column("shear strength", _weight_strength),
+        Column("exponent of size", "strength_exponent", 3, screen=False),
+        remarks=_rigid_faces,
         presses=True,
         may_be_rigid=True,
     ),
     _joint(
         "decorrelation_length",
-        rows(
-            "decorrelation",
-            ("direction",),
-            Column("decorrelation length", "decorrelation_length"),
-            Column("95 % interval", ("decorrelation_length_low", "decorrelation_length_high"), screen=False),
-        ),
+        "decorrelation",
+        ("direction",),
+        Column("decorrelation length", "decorrelation_length"),
+        Column("95 % interval", ("decorrelation_length_low", "decorrelation_length_high"), screen=False),
         one_direction=True,
     ),
     _of_gap(
         "transmissivity",
-        rows=rows(
-            "aperture",
-            ("shear",),
-            Column("normal force", "normal_force", screen=False),
-            Column("mean aperture", "aperture"),
-            Column("hydraulic (x)", at_value("hydraulic_aperture", "axis", "x")),
-            Column("hydraulic (y)", at_value("hydraulic_aperture", "axis", "y"), screen=False),
-            remarks=_transmissivity,
-        ),
+        "aperture",
+        ("shear",),
+        Column("normal force", "normal_force", screen=False),
+        Column("mean aperture", "aperture"),
+        Column("hydraulic (x)", at_value("hydraulic_aperture", "axis", "x")),
+        Column("hydraulic (y)", at_value("hydraulic_aperture", "axis", "y"), screen=False),
+        remarks=_transmissivity,
     ),
     _of_gap(
         "uplift",
+        "uplift",
+        ("shear",),
+        Column("effective stress", "effective_stress"),
+        Column("normal stress", _normal_stress),
+        Column("uplift", at_value("uplift_force", "diagram", "joint")),
+        Column("of the drained diagram", at_value("uplift_force", "diagram", "drained"), screen=False),
+        Column("of the linear diagram", at_value("uplift_force", "diagram", "linear"), screen=False),
+        Column("arm, joint", at_value("uplift_arm", "diagram", "joint")),
+        remarks=_uplift_remarks,
         caveats=_limits_of_uplift,
-        rows=rows(
-            "uplift",
-            ("shear",),
-            Column("effective stress", "effective_stress"),
-            Column("normal stress", _normal_stress),
-            Column("uplift", at_value("uplift_force", "diagram", "joint")),
-            Column("of the drained diagram", at_value("uplift_force", "diagram", "drained"), screen=False),
-            Column("of the linear diagram", at_value("uplift_force", "diagram", "linear"), screen=False),
-            Column("arm, joint", at_value("uplift_arm", "diagram", "joint")),
-            remarks=_uplift_remarks,
-        ),
     ),
 )

@@ -82,11 +82,6 @@ class Rows:
     load: str = "nominal_pressure"
 
 
-def rows(title: str, over: tuple[str, ...], *columns: Column, **options: Any) -> Rows:
-    """Return the table of a stage with these columns; the options are the other fields of `Rows`."""
-    return Rows(title, over, columns, **options)
-
-
 @dataclass(frozen=True)
 class ResultTable:
     """A table as text: the head and cells of the key of each row, and those of its values.

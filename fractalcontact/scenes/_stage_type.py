@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Literal
 
-from fractalcontact.scenes._result_tables import Remarks, Rows, no_remarks
+from fractalcontact.scenes._result_tables import Column, Remarks, Rows, no_remarks
 from fractalcontact.scenes._scene import LOADS
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
@@ -147,3 +147,20 @@ class StageType:
         without_default = arguments_of(self.function)[1]
         known = self.keys or parameters_of(self.function)
         return (*self.required, *(key for key in known if key in without_default))
+
+
+def stage_type(
+    name: str,
+    needs: tuple[str, ...],
+    function: str,
+    title: str = "",
+    over: tuple[str, ...] = (),
+    *columns: Column,
+    remarks: Remarks = no_remarks,
+    first_dim: bool = False,
+    **fields: Any,
+) -> StageType:
+    """Return a row of the table of stages; with columns, the table of its result has them (see `Rows`)."""
+    if columns:
+        fields["rows"] = Rows(title, over, columns, remarks, first_dim)
+    return StageType(name, needs, function, **fields)

@@ -11,9 +11,9 @@ import xarray as xr
 from fractalcontact.base.file_contents import remarks
 from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import quantity_text
-from fractalcontact.scenes._result_tables import Column, length, plain, rows
+from fractalcontact.scenes._result_tables import Column, Rows, length, plain
 from fractalcontact.scenes._scene import PRESS
-from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType
+from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType, stage_type
 
 
 def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -89,14 +89,16 @@ STATISTICS = (
     Column("Spk", "reduced_peak_height", screen=False),
     Column("Svk", "reduced_valley_depth", screen=False),
 )
-SLIP_TABLE = rows(
+SLIP_TABLE = Rows(
     "partial slip",
     ("shear", "step"),
-    Column("displacement", "tangential_displacement"),
-    Column("sticks", _sticks),
-    Column("stiffness", "tangential_stiffness"),
-    Column("dissipated energy", "dissipated_energy"),
-    remarks=_slip_limits,
+    (
+        Column("displacement", "tangential_displacement"),
+        Column("sticks", _sticks),
+        Column("stiffness", "tangential_stiffness"),
+        Column("dissipated energy", "dissipated_energy"),
+    ),
+    _slip_limits,
     load="tangential_force",
 )
 SURFACE = ("surfaces",)
@@ -114,49 +116,49 @@ def _curve(method: str) -> StageType:
 
 
 STAGES = (
-    StageType(
+    stage_type(
         "surfaces",
         (),
         "surfaces.read",
-        "surface",
-        "surfaces.height",
+        "ISO 25178",
+        (),
+        *STATISTICS,
+        remarks=_gridding,
+        table="surface",
+        wanted="surfaces.height",
         takes="file",
-        rows=rows("ISO 25178", (), *STATISTICS, remarks=_gridding),
     ),  # with its description
     StageType("surfaces/description", SURFACE, "surfaces.describe", wanted="surfaces.describe"),
-    StageType(
-        "surfaces/texture",
-        SURFACE,
-        "surfaces.texture",
-        wanted="surfaces.texture",
-        rows=rows("texture", (), *STATISTICS),
+    stage_type(
+        "surfaces/texture", SURFACE, "surfaces.texture", "texture", (), *STATISTICS, wanted="surfaces.texture"
     ),
-    StageType(
+    stage_type(
         "dimensions",
         SURFACE,
         "dimensions.estimate",
-        "dimensions",
-        rows=rows(
-            "fractal dimension",
-            ("method",),
-            Column("dimension D", "fractal_dimension", 3),
-            Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
-            Column("range of scales", ("scale_min", "scale_max")),
-            Column("goodness of fit", _misfit, screen=False),
-            remarks=_of_method,
-        ),
+        "fractal dimension",
+        ("method",),
+        Column("dimension D", "fractal_dimension", 3),
+        Column("95 % interval", ("fractal_dimension_low", "fractal_dimension_high"), 3),
+        Column("range of scales", ("scale_min", "scale_max")),
+        Column("goodness of fit", _misfit, screen=False),
+        remarks=_of_method,
+        table="dimensions",
     ),
     *map(_curve, CURVES),
-    StageType(
+    stage_type(
         "contact",
         SURFACE,
         "contact.press",
         "contact",
-        f"contact.{PRESS}",
+        ("step",),
+        Column("closure", "closure"),
+        *AREAS,
+        table="contact",
+        wanted=f"contact.{PRESS}",
         keeps=CONTACT_MAPS,
         splits=("step",),
         presses=True,
-        rows=rows("contact", ("step",), Column("closure", "closure"), *AREAS),
     ),
     # not below contact: its steps are others than those of the load path
     StageType(
