@@ -78,12 +78,11 @@ def result_tree(scene: Scene, study: StudyResults, main: xr.Dataset | None = Non
 def _without_folders(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of a scene; of a file outside its folder the name alone."""
     plain = dict(tables)
-    for name in ("surface", "upper"):
-        read = plain.get(name, {}).get("read")
-        if isinstance(read, list):
-            plain[name] = {**plain[name], "read": [_name_outside(each) for each in read]}
+    for name, table in ((name, plain.get(name, {})) for name in ("surface", "upper")):
+        if isinstance(read := table.get("read"), list):
+            plain[name] = {**table, "read": list(map(_name_outside, read))}
         elif read is not None:
-            plain[name] = {**plain[name], "read": _name_outside(read)}
+            plain[name] = {**table, "read": _name_outside(read)}
     return plain
 
 

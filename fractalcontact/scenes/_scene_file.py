@@ -110,8 +110,7 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
         return scene, problems  # the check loads every function whose arguments the tables may name
     if _is_too_deep(scene.tables):
         raise InvalidInput(problems.where, [TOO_DEEP])
-    tables = {key: _in_plain_words(value, key) for key, value in scene.tables.items()}
-    tables = {key: _expand_ranges(value, key, problems) for key, value in tables.items()}
+    tables = {key: _in_plain_words(value, key, key, problems) for key, value in scene.tables.items()}
     for key, name in (("lower", "surface"), ("upper", "upper")):  # files of both faces, in one table
         if isinstance(tables.get("joint"), dict) and key in tables["joint"]:
             own = tables.get(name)
@@ -123,9 +122,8 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
             tables[name] = {}
     scene = replace(scene, tables=tables)
     _check(scene, problems)
-    problems.messages.sort(
-        key=lambda message: "an unknown key" not in message
-    )  # other problems follow from it
+    # other problems follow from an unknown key
+    problems.messages.sort(key=lambda message: "an unknown key" not in message)
     return scene, problems
 
 
@@ -162,12 +160,17 @@ def _find(path: Path) -> Path:
     )
 
 
-def _in_plain_words(value: Any, key: str) -> Any:
-    """Replace what the commands understand as well: "30 GPa", "west", and "psd" for the spectrum."""
+def _in_plain_words(value: Any, key: str, place: str, problems: Problems) -> Any:
+    """Replace what the commands understand as well ("30 GPa", "west", "psd" for the spectrum), and ranges."""
     if isinstance(value, dict):
-        return {word: _in_plain_words(item, word) for word, item in value.items()}
+        for words in (_scene_keys.EVEN, _scene_keys.LOGARITHMIC):
+            if value and set(value) <= set(words):
+                return _range(value, words, place, problems)
+        return {
+            word: _in_plain_words(item, word, f"{place}.{word}", problems) for word, item in value.items()
+        }
     if isinstance(value, list):
-        return [_in_plain_words(item, key) for item in value]
+        return [_in_plain_words(item, key, place, problems) for item in value]
     if not isinstance(value, str):
         return value
     if key in _scene_keys.PRESSURES:
@@ -176,18 +179,8 @@ def _in_plain_words(value: Any, key: str) -> Any:
     return _scene_keys.SPELLINGS.get(key, {}).get(value, value)
 
 
-def _expand_ranges(value: Any, key: str, problems: Problems) -> Any:
-    """Replace the ranges {start, stop, step} and {first, last, count} (logarithmic) by lists."""
-    if not isinstance(value, dict):
-        return value
-    for words in (_scene_keys.EVEN, _scene_keys.LOGARITHMIC):
-        if value and set(value) <= set(words):
-            return _range(value, words, key, problems)
-    return {word: _expand_ranges(item, f"{key}.{word}", problems) for word, item in value.items()}
-
-
 def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -> Any:
-    """Return the list of a range; a range with problems stays as it is."""
+    """Return the list of {start, stop, step} or {first, last, count} (logarithmic); as it is if not valid."""
     expected = f"a number (a range has {', '.join(words)})"
     checks = [
         problems.number(f"{key}.{word}", value[word])
@@ -197,17 +190,17 @@ def _range(value: Table, words: tuple[str, ...], key: str, problems: Problems) -
     ]
     if not all(checks):
         return value
-    low, high, number = (float(value[word]) for word in words)
+    (low, high, number), most = (float(value[word]) for word in words), _scene_keys.LONGEST_RANGE
     if words is _scene_keys.EVEN:
-        valid = number > 0 and high >= low and (high - low) / number < _scene_keys.LONGEST_RANGE
+        valid = number > 0 and high >= low and (high - low) / number < most
         expected = "a range with step > 0, stop >= start and at most 10^6 entries"
-        if not problems.require(valid, key, expected, value):
-            return value
-        return [low + number * index for index in range(round((high - low) / number) + 1)]
-    valid = low > 0 and high > 0 and 1 <= number < _scene_keys.LONGEST_RANGE and number == int(number)
-    expected = "a logarithmic range with first, last > 0 and an integer count >= 1"
+    else:
+        valid = low > 0 and high > 0 and 1 <= number < most and number == int(number)
+        expected = "a logarithmic range with first, last > 0 and an integer count >= 1"
     if not problems.require(valid, key, expected, value):
         return value
+    if words is _scene_keys.EVEN:
+        return [low + number * index for index in range(round((high - low) / number) + 1)]
     return [float(entry) for entry in np.geomspace(low, high, int(number))]
 
 
