@@ -1,4 +1,7 @@
-"""Running a scene: validated, studied, drawn, and written as one file."""
+"""Running a scene: validated, studied, drawn, and written as one file.
+
+Of many scans each is an ordinary study in its own folder, and their numbers are stacked along `scan`.
+"""
 
 from __future__ import annotations
 
@@ -10,35 +13,50 @@ import warnings
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from fractalcontact.base import netcdf, signals
-from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
-from fractalcontact.base.file_contents import stage_rows
+from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput, warn
+from fractalcontact.base.file_contents import read_headers, stage_rows
 from fractalcontact.base.files import PARTIAL_RESULT, RESULT, locked, written_whole
 from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK, most_workers
+from fractalcontact.base.schema import label
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _results_folder
-from fractalcontact.scenes._executor import Workers, worker_processes, workers_of
-from fractalcontact.scenes._export import tables
+from fractalcontact.scenes._executor import Workers, run_tasks, worker_processes, workers_of
+from fractalcontact.scenes._export import MAP_DIMS, tables
 from fractalcontact.scenes._html_report import page_contents, pictures_of, write_report
 from fractalcontact.scenes._inputs import read_surface
-from fractalcontact.scenes._result_tree import OVERVIEW, note_run_time, pictured, pooled, result_tree
-from fractalcontact.scenes._results_folder import SCANS, PartStore, with_seeds
-from fractalcontact.scenes._scans import ScanStudies
+from fractalcontact.scenes._result_tables import SCAN
+from fractalcontact.scenes._result_tree import (
+    OVERVIEW,
+    PARTIAL,
+    in_words,
+    main_results,
+    note_run_time,
+    pictured,
+    pooled,
+    result_tree,
+)
+from fractalcontact.scenes._results_folder import REPORT, SCANS, PartStore, digest_of, folder_of, with_seeds
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._scene_file import scans_of
 from fractalcontact.scenes._stages import FIGURES, check_memory, stages_of
-from fractalcontact.scenes._study import Study, StudyResults, study_ensemble
+from fractalcontact.scenes._study import Study, StudyResults, reason_of, stacked, study_ensemble
 from fractalcontact.scenes._summary import Summary, datasheet, summary_of
 from fractalcontact.scenes._validation import implausible_result, validated, warn_of
+
+DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
+NO_ACCESS = "the worker does not see the folder of the results"
+Numbers = dict[str, xr.Dataset]
 
 
 def run(
@@ -150,7 +168,7 @@ def _run_scans(
     with locked(folder), signals.noted() as stop:
         studies = ScanStudies(scans, folder)
         with netcdf.GrowingFile(folder / RESULT) as together:
-            studies.run(_study_scan, together, workers, stop, progress=progress)
+            studies.run(together, workers, stop, progress)
             if stop:
                 done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
                 raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
@@ -168,7 +186,7 @@ def _run_scans(
             _results_folder.remove_old_figures(folder, figures)
             with pictures_of(figures) as pictures:
                 whole = summary_of(tree)
-                write_report(tree, folder / _results_folder.REPORT, pictures, whole)
+                write_report(tree, folder / REPORT, pictures, whole)
         PartStore(folder).clear()  # of marks for workers; each scan has its own parts
         failed = sum(map(bool, studies.reasons.values()))
         if failed:
@@ -246,7 +264,7 @@ def _run(
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
         with ThreadPoolExecutor(1) as beside:  # the file waits for the disk while the page is written
             replaced = beside.submit(netcdf.replace_attributes, folder / RESULT, changed)
-            write_report(tree, folder / _results_folder.REPORT, pictures, whole, contents)
+            write_report(tree, folder / REPORT, pictures, whole, contents)
             replaced.result()
         if scene.want.datasheet and not study.failures:
             tables(tree, folder / _results_folder.TABLES)
@@ -313,3 +331,162 @@ def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)
     return files
+
+
+@dataclass(frozen=True, repr=False)
+class _ScanTask:
+    """The study of one scan in its folder.
+
+    A finished scan is one file, `scans/NAME/result.nc`. Whatever ends a run, the next one takes the finished
+    scans as they are; it repeats those that failed, and those whose file or settings have changed.
+    """
+
+    scene: Scene
+    folder: Path
+
+    def __call__(self, store: PartStore, stop: signals.Stop) -> tuple[str, Numbers] | None:
+        """Return why it or some of its stages failed, and its numbers; None if a stop cut the study short."""
+        del store
+        if stop:
+            return None
+        try:
+            if not self.folder.parent.is_dir():
+                return NO_ACCESS, {}
+            digests = Study(self.scene, PartStore(None)).digests
+            digest = digest_of([digests, self.scene.want.figures])
+            if _is_finished(self.folder, digest):
+                return "", _numbers(netcdf.open(self.folder / RESULT))
+            for name in (RESULT, REPORT):
+                (self.folder / name).unlink(missing_ok=True)
+            tree = _study_scan(self.scene, self.folder, stop, {DIGEST: digest})
+            return str(tree.attrs.get("completeness", "")).removeprefix(PARTIAL), _numbers(tree)
+        except signals.Stopped:
+            return None
+        except Exception as error:  # whatever it is, the other scans go on, and the table states it
+            return reason_of(error), {}
+
+
+def _is_finished(folder: Path, digest: str) -> bool:
+    if not (folder / RESULT).is_file() or not (folder / REPORT).is_file():  # the report is written last
+        return False
+    try:
+        return read_headers(folder / RESULT, lambda _: False)["/"].attrs.get(DIGEST) == digest
+    except FractalContactError:
+        return False
+
+
+def _numbers(tree: xr.DataTree) -> Numbers:
+    """Return the groups of a result without its maps."""
+    groups = {node.path.strip("/"): node.to_dataset(inherit=False) for node in tree.subtree}
+    return {name: data.drop_dims(MAP_DIMS, errors="ignore") for name, data in groups.items()}
+
+
+@dataclass
+class ScanStudies:
+    """The studies of the scans of a scene: why some failed, and their numbers as far as they are finished.
+
+    Attributes
+    ----------
+    reasons : dict of str to str
+        By scan, why it or some of its stages failed; empty where it is finished.
+    numbers : dict of str to mapping
+        The groups of each scan that has a result; "" is their root.
+    """
+
+    scans: Mapping[str, Scene]
+    folder: Path
+    reasons: dict[str, str] = field(default_factory=dict)
+    numbers: dict[str, Numbers] = field(default_factory=dict)
+
+    def run(
+        self, file: netcdf.GrowingFile, workers: Workers | None, stop: signals.Stop, progress: bool
+    ) -> None:
+        """Study the scans that are not finished; each failure is a reason.
+
+        The maps of a scan are written to the file of all as soon as those of the scans before it are: this
+        process has time for it while workers study the next ones.
+        """
+        names = list(self.scans)
+        (self.folder / SCANS).mkdir(exist_ok=True)
+        place = self.folder / SCANS
+        tasks = {name: _ScanTask(scene, place / folder_of(name)) for name, scene in self.scans.items()}
+        # of formats with two bytes for each point, the smallest
+        points = max((source.stat().st_size // 2 for source in self._sources()), default=0)
+        finished = run_tasks(tasks, PartStore(self.folder), stop, workers, points=points)
+        found: dict[str, tuple[str, Numbers]] = {}
+        for name, result in signals.track(finished, progress, SCANS, unit=SCAN, total=len(names)):
+            found[name] = result
+            while len(self.reasons) < len(names) and names[len(self.reasons)] in found:
+                self._add(names[len(self.reasons)], *found.pop(names[len(self.reasons)]), file)
+        for name in found:  # behind one that a stop left out
+            self._add(name, *found[name], file)
+
+    def _add(self, name: str, reason: str, numbers: Numbers, file: netcdf.GrowingFile) -> None:
+        """Note the result of a scan, and write its maps."""
+        result = self.folder / SCANS / folder_of(name) / RESULT
+        if not numbers or not result.is_file():
+            self.reasons[name] = NO_ACCESS if numbers else reason
+            return
+        if not self.numbers:  # the groups of all scans come before those of each
+            paths = (OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars))
+            file.add_groups({f"/{path}": xr.Dataset() for path in paths})
+        self.reasons[name], self.numbers[name] = reason, numbers
+        place = f"/{SCANS}/{result.parent.name}"
+        file.add_groups({place + path: maps for path, maps in netcdf.groups_over(result, MAP_DIMS).items()})
+
+    def _sources(self) -> Iterator[Path]:
+        for scene in self.scans.values():
+            file = scene.folder / os.path.expandvars(str(scene.surface.read))
+            if file.is_file():
+                yield file
+
+    @property
+    def missing(self) -> int:
+        """How many scans a stop has left out."""
+        return len(self.scans) - len(self.reasons)
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Seconds that each stage took, all scans together."""
+        total: dict[str, float] = {}
+        for groups in self.numbers.values():
+            for stage, facts in provenance_of(groups[""]).get("stages", {}).items():
+                total[stage] = total.get(stage, 0.0) + float(facts["run_time"])
+        return total
+
+    def groups(self) -> Numbers:
+        """Return the numbers of all scans along `scan`, and the overview."""
+        groups = {OVERVIEW: self._overview()}
+        for path in dict.fromkeys(path for each in self.numbers.values() for path in each if path):
+            having = {name: each[path] for name, each in self.numbers.items() if path in each}
+            if any(data.data_vars for data in having.values()):
+                groups[path] = stacked(having, SCAN)
+        return groups
+
+    def main(self) -> xr.Dataset:
+        """Return the main results of all scans, NaN where a scan has none."""
+        mains = {name: main_results(groups) for name, groups in self.numbers.items()}
+        table = xr.Dataset(coords={SCAN: list(self.reasons)})
+        for key in dict.fromkeys(key for main in mains.values() for key in main.data_vars):
+            found = {name: main[key] for name, main in mains.items() if key in main}
+            values = [float(found.get(name, np.nan)) for name in self.reasons]
+            table[key] = (SCAN, values, next(iter(found.values())).attrs)
+        return table
+
+    def _overview(self) -> xr.Dataset:
+        """Return a row for every scan: what stands for its study, whether it failed, and why."""
+        names, roots = list(self.reasons), {name: each[""] for name, each in self.numbers.items()}
+        table = in_words(self.main(), with_group=False)
+        table["status"] = (
+            SCAN,
+            [
+                "failed" if name not in roots else "incomplete" if self.reasons[name] else "done"
+                for name in names
+            ],
+        )
+        table["reason"] = (SCAN, [self.reasons[name] for name in names], {"long_name": "why it failed"})
+        caveats = {
+            name: str(root.attrs.get("caveats", "none")).replace("none", "") for name, root in roots.items()
+        }
+        table["caveats"] = (SCAN, [caveats.get(name, "") for name in names])
+        return label(table, keep_notes=True)
