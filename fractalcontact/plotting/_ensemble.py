@@ -41,7 +41,7 @@ def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
     curves = [name for name, variable in flat.data_vars.items() if _is_curve(variable)]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
-        reduced = flat[curves].quantile(share, MEMBER, keep_attrs=True).data_vars
+        reduced = {name: flat[name].quantile(share, MEMBER, keep_attrs=True) for name in curves}
     first = flat.isel({MEMBER: 0}, drop=True).assign(reduced)
     return first.drop_vars("quantile", errors="ignore").set_coords(loads)
 
