@@ -145,46 +145,19 @@ def _subtract(values: Array, basis: list[tuple[Array, ...]], weights: Array) -> 
         line -= np.einsum("k,kx->x", factors, along)
 
 
-@dataclass(frozen=True)
-class Line:
-    """A straight line through ln value against ln scale.
+def fitted_slope(scale: Array, value: Array) -> float:
+    """Return the slope of the line through ln value against ln scale; NaN of fewer than two usable points.
 
-    `standard_error` assumes independent errors. Points of a scaling curve are correlated, so it gives no
-    confidence interval by itself.
+    Points are usable where both are finite and positive; all of them have one weight.
     """
-
-    slope: float
-    intercept: float
-    standard_error: float
-    points: int
-
-
-def fit_line(scale: Array, value: Array) -> Line:
-    """Fit ln value = intercept + slope * ln scale over the finite, positive points.
-
-    Parameters
-    ----------
-    scale, value : ndarray, shape (n,)
-
-    Returns
-    -------
-    Line
-        NaN if fewer than two points can be used.
-    """
-    scale, value = np.asarray(scale, float), np.asarray(value, float)
-    (x, x_unit), (y, y_unit) = logarithm(scale), logarithm(value)
+    x, y = (logarithm(np.asarray(each, float)) for each in (scale, value))
     usable = np.isfinite(x) & np.isfinite(y)
     x, y = x[usable], y[usable]
     if x.size < 2 or np.ptp(x) == 0:
-        return Line(np.nan, np.nan, np.nan, int(x.size))
-    w = np.full(x.size, 1.0 / x.size)
-    x_mean, y_mean = float(w @ x), float(w @ y)
-    spread = float(w @ (x - x_mean) ** 2)
-    slope = float(w @ ((x - x_mean) * (y - y_mean))) / spread
-    residual = y - y_mean - slope * (x - x_mean)
-    error = np.sqrt(float(w @ residual**2) / spread / (x.size - 2)) if x.size > 2 else np.nan
-    intercept = y_mean - slope * x_mean + (y_unit.item() - slope * x_unit.item()) * np.log(2.0)
-    return Line(slope, float(intercept), float(error), int(x.size))
+        return float("nan")
+    weights = np.full(x.size, 1.0 / x.size)
+    x, y = x - float(weights @ x), y - float(weights @ y)
+    return float(weights @ (x * y)) / float(weights @ x**2)
 
 
 def local_slope(scale: Array, value: Array) -> Array:
@@ -195,14 +168,14 @@ def local_slope(scale: Array, value: Array) -> Array:
     scale, value = np.asarray(scale, float), np.asarray(value, float)
     if scale.size < 2:
         return np.full(value.shape, np.nan)
-    y = logarithm(value)[0]
-    return np.asarray(np.gradient(np.where(np.isfinite(y), y, np.nan), logarithm(scale)[0], axis=-1))
+    y = logarithm(value)
+    return np.asarray(np.gradient(np.where(np.isfinite(y), y, np.nan), logarithm(scale), axis=-1))
 
 
-def logarithm(values: Array) -> tuple[Array, Array]:
-    """Return ln(values / 2^k) and k, so that the unit of the values changes no bit of a slope.
+def logarithm(values: Array) -> Array:
+    """Return ln(values / 2^k), of each curve along the last axis with its own k.
 
-    Each curve, along the last axis, has its own k, which has shape (..., 1).
+    The unit of the values then changes no bit of a slope.
     """
     positive = np.isfinite(values) & (values > 0)
     lowest = np.min(values, axis=-1, keepdims=True, initial=np.inf, where=positive)
@@ -211,7 +184,7 @@ def logarithm(values: Array) -> tuple[Array, Array]:
     lowest = np.maximum(lowest, np.ldexp(highest, -1000))
     unit = np.frexp(np.where(np.isfinite(lowest), lowest, 0.5))[1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log(np.ldexp(values, -unit)), unit
+        return np.asarray(np.log(np.ldexp(values, -unit)))
 
 
 @dataclass(frozen=True)

@@ -173,7 +173,7 @@ def _tiles(surface: Surface, tile: int | None) -> Iterator[Array]:
 def _local_slope(curve: Curve) -> Array:
     """Return the slope of a line through the points within a factor of sqrt 2, weighted by counts."""
     scale, value, count = curve.scale, curve.value, curve.count
-    (x, _), (y, _) = logarithm(scale), logarithm(value)
+    x, y = logarithm(scale), logarithm(value)
     good = np.isfinite(y)
     weights = np.where(good, count, 0.0)
     y = np.where(good, y, 0.0)

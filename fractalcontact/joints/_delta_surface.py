@@ -25,7 +25,7 @@ from fractalcontact.base.compass import (
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import Array, float_array, is_within
-from fractalcontact.base.regression import fit_line, rounding_of
+from fractalcontact.base.regression import fitted_slope, rounding_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
@@ -388,4 +388,4 @@ def _slope(scale: xr.DataArray, value: xr.DataArray, window: Window) -> float:
     if count < 2:
         problem = f"window: expected at least two scales of the block, got {count} in {window}"
         raise InvalidInput("fractalcontact.joints.delta_dimension", [problem])
-    return fit_line(lengths[inside], np.asarray(value.values, dtype=float)[inside]).slope
+    return fitted_slope(lengths[inside], np.asarray(value.values, dtype=float)[inside])

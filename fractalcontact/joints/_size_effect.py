@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.compass import COMPASS, direction_coords, read_directions
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.regression import fit_line
+from fractalcontact.base.regression import fitted_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import PAPER
@@ -151,7 +151,7 @@ def self_weight(
     angle = crack.basic_friction_angle + np.degrees(np.arctan(opening / shears[:, None]))
     strength = pressures * np.tan(np.radians(np.where(angle < 90.0, angle, math.nan)))
     exponents = [
-        fit_line(sizes, row).slope if sizes.size > 1 and (row > 0).all() else math.nan  # False for NaN
+        fitted_slope(sizes, row) if sizes.size > 1 and (row > 0).all() else math.nan  # False for NaN
         for row in strength.reshape(-1, sizes.size)
     ]
     variables |= {
