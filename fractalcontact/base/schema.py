@@ -540,6 +540,12 @@ def declare(quantities: Mapping[str, Quantity]) -> None:
 NOTES = ("long_name", "comment", "reason")
 
 
+def units_of(name: Hashable, attributes: Mapping[Any, Any]) -> str:
+    """Return the units that a variable states, or else those of its name; "" where it has none."""
+    quantity = QUANTITIES.get(str(name))
+    return str(attributes.get("units") or (quantity.units if quantity else "") or "")
+
+
 def in_cells(name: str) -> dict[str, str]:
     """Return the attributes of a length or an area that is counted in cells; none of other quantities."""
     quantity = QUANTITIES.get(name)

@@ -124,11 +124,9 @@ class Problems:
 
     def construct(self, constructor: Callable[..., T], *arguments: Any, **options: Any) -> T | None:
         """Return what `constructor` makes of the arguments; None if it has problems, which are collected."""
-        try:
+        with self.collect():
             return constructor(*arguments, **options)
-        except InvalidInput as error:
-            self._extend(error.problems)
-            return None
+        return None
 
     def _extend(self, lines: Iterable[str]) -> None:
         self.messages.extend(line for line in lines if line not in self.messages)

@@ -16,7 +16,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import require_library
 from fractalcontact.base.files import written_whole
-from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.schema import units_of
 from fractalcontact.base.validation import Problems, Words, writing
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -114,9 +114,7 @@ def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
 
 def heading(dataset: xr.Dataset, name: str) -> str:
     """Return the name of a variable with its unit."""
-    attributes = dataset.variables[name].attrs if name in dataset.variables else {}
-    quantity = QUANTITIES.get(name)
-    units = attributes.get("units", quantity.units if quantity else "") or ""
+    units = units_of(name, dataset.variables[name].attrs if name in dataset.variables else {})
     return f"{name} ({units})" if units not in ("", "1") else name
 
 

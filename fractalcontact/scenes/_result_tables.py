@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import spread_indices
-from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.schema import units_of
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -172,7 +172,7 @@ def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
     value = state[dim]
     if value.dtype.kind not in "fiu":
         return str(value.values)
-    return amount(value, scale=scale_for(_units_of(value), data[dim].values))
+    return amount(value, scale=scale_for(units_of(value.name, value.attrs), data[dim].values))
 
 
 def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> list[str] | None:
@@ -226,14 +226,11 @@ def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
     if name in FRACTIONS:
         scale = Scale(0.01, "%")
     elif scale is None:
-        scale = scale_for(_units_of(data), float(finite(data).mean()) if finite(data).size else np.nan)
+        scale = scale_for(
+            units_of(data.name, data.attrs), float(finite(data).mean()) if finite(data).size else np.nan
+        )
     unit = f" {scale.unit}".rstrip()
     return _over_members(scale(data.values), lambda value: number(value, digits), _decimals_of, unit)
-
-
-def _units_of(data: Any) -> str:
-    quantity = QUANTITIES.get(str(data.name))
-    return str(data.attrs.get("units") or (quantity.units if quantity else "") or "")
 
 
 def column_scale(data: Any) -> Scale | None:
@@ -245,7 +242,7 @@ def column_scale(data: Any) -> Scale | None:
     sizes = sizes[sizes > 0]
     if sizes.size == 0 or sizes.max() >= 1e3 * sizes.min():
         return None
-    return scale_for(_units_of(data), float(np.median(sizes)))
+    return scale_for(units_of(data.name, data.attrs), float(np.median(sizes)))
 
 
 def plain(data: Any, decimals: int, *, sign: bool = False) -> str:
