@@ -21,16 +21,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base import files
 from fractalcontact.base.errors import InvalidInput, UnreadableFile, require_library
 from fractalcontact.base.file_contents import groups_in
-from fractalcontact.base.files import (
-    DAMAGED,
-    NETCDF_LOCK,
-    append_checksum,
-    clear_partial,
-    require_checksum,
-    written_whole,
-)
 from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.resources import require_unpacked, unpacked_limit
 from fractalcontact.base.schema import CONVENTIONS, encoded
@@ -103,9 +96,9 @@ class GrowingFile:
 
         with _writing(self.target), contextlib.ExitStack() as stack:
             self.target.parent.mkdir(parents=True, exist_ok=True)
-            clear_partial(self.target.parent)
-            self.temporary = stack.enter_context(written_whole(self.target))
-            with NETCDF_LOCK:
+            files.clear_partial(self.target.parent)
+            self.temporary = stack.enter_context(files.written_whole(self.target))
+            with files.NETCDF_LOCK:
                 self.file = netCDF4.Dataset(self.temporary, "w", format="NETCDF4")
             stack.push(self._close)
             self.stack = stack.pop_all()  # here an error has left no file behind
@@ -129,10 +122,10 @@ class GrowingFile:
             self.stack.__exit__(*error)
 
     def _close(self, kind: type[BaseException] | None, *_: Any) -> None:
-        with NETCDF_LOCK:
+        with files.NETCDF_LOCK:
             self.file.close()
         if kind is None:
-            append_checksum(self.temporary)
+            files.append_checksum(self.temporary)
 
 
 @contextlib.contextmanager
@@ -154,11 +147,11 @@ def replace_attributes(path: Path, attributes: Mapping[str, str]) -> None:
     """Replace global attributes of a file, in a copy that takes its place when it is complete."""
     import netCDF4
 
-    with _writing(path), written_whole(path) as copy:
+    with _writing(path), files.written_whole(path) as copy:
         shutil.copyfile(path, copy)
-        with NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
+        with files.NETCDF_LOCK, netCDF4.Dataset(copy, "a") as file:
             file.setncatts(dict(attributes))
-        append_checksum(copy)
+        files.append_checksum(copy)
 
 
 def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
@@ -211,7 +204,7 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     except UnreadableFile:
         raise
     except Exception as error:
-        raise UnreadableFile(where, [f"path: {source.name!r} {DAMAGED}"]) from error
+        raise UnreadableFile(where, [f"path: {source.name!r} {files.DAMAGED}"]) from error
     for node in tree.subtree:
         node.dataset = _as_saved(node.to_dataset(inherit=False))
     saved_type = tree.attrs.get(_TYPE, "DataTree" if tree.children else "Dataset")
@@ -285,8 +278,8 @@ def _write(groups: Mapping[str, xr.Dataset], file: Any) -> None:
         for variable in dataset.variables.values():
             if variable.chunks is None:
                 variable.load()  # a lazy array of another file needs the lock of xarray
-        with NETCDF_LOCK:
-            store = NetCDF4DataStore(file, group=name, mode="a", lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
+        with files.NETCDF_LOCK:
+            store = NetCDF4DataStore(file, group=name, mode="a", lock=files.NETCDF_LOCK)  # type: ignore[no-untyped-call]
             dataset.dump_to_store(store, writer=waiting)
     writer = ArrayWriter()  # type: ignore[no-untyped-call]
     for source, target in waiting.arrays:
@@ -300,9 +293,9 @@ def _read(path: Path, dims: frozenset[str] = frozenset()) -> dict[str, xr.Datase
     from xarray.backends import NetCDF4DataStore
 
     with reading("fractalcontact.open", path):
-        require_checksum("fractalcontact.open", path)
+        files.require_checksum("fractalcontact.open", path)
     groups = {}
-    with NETCDF_LOCK, netCDF4.Dataset(path) as file:
+    with files.NETCDF_LOCK, netCDF4.Dataset(path) as file:
         unpacked = sum(map(_unpacked_size, groups_in(file)))
         limit = unpacked_limit(path.stat().st_size, 250)  # contact maps are packed to a hundredth
         require_unpacked("fractalcontact.open", path.name, unpacked, limit)
@@ -321,11 +314,11 @@ def _opened(path: Path, chunks: Any) -> dict[str, xr.Dataset]:
     import netCDF4
     from xarray.backends import NetCDF4DataStore
 
-    with NETCDF_LOCK, netCDF4.Dataset(path) as file:
+    with files.NETCDF_LOCK, netCDF4.Dataset(path) as file:
         names = [group.path for group in groups_in(file)]
     groups = {}
     for name in names:
-        store = NetCDF4DataStore.open(path, group=name, lock=NETCDF_LOCK)  # type: ignore[no-untyped-call]
+        store = NetCDF4DataStore.open(path, group=name, lock=files.NETCDF_LOCK)  # type: ignore[no-untyped-call]
         dataset = xr.open_dataset(store)
         numbers = [str(key) for key, array in dataset.data_vars.items() if array.dtype != object]
         for key in dataset.variables.keys() - set(numbers):

@@ -14,16 +14,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    CancelledError,
-    Executor,
-    Future,
-    ProcessPoolExecutor,
-    ThreadPoolExecutor,
-    wait,
-)
+from concurrent import futures
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,7 +49,7 @@ class Workers:
         The workers see the folders of this machine.
     """
 
-    executor: Executor
+    executor: futures.Executor
     count: int
     local: bool
 
@@ -75,9 +66,11 @@ def workers_of(client: Any) -> Workers | None:
         return None
     if hasattr(client, "get_executor") and hasattr(client, "nthreads"):
         return Workers(client.get_executor(pure=False), sum(client.nthreads().values()), local=False)
-    if isinstance(client, Executor):
+    if isinstance(client, futures.Executor):
         count = getattr(client, "_max_workers", None) or os.cpu_count() or 1
-        return Workers(client, count, local=isinstance(client, (ProcessPoolExecutor, ThreadPoolExecutor)))
+        return Workers(
+            client, count, local=isinstance(client, (futures.ProcessPoolExecutor, futures.ThreadPoolExecutor))
+        )
     expected = "a distributed.Client, a concurrent.futures.Executor or None"
     raise InvalidInput(
         "fractalcontact.scenes.run", [f"client: expected {expected}, got {type(client).__name__}"]
@@ -85,7 +78,7 @@ def workers_of(client: Any) -> Workers | None:
 
 
 @contextmanager
-def worker_processes(count: int) -> Iterator[Executor | None]:
+def worker_processes(count: int) -> Iterator[futures.Executor | None]:
     """Provide an executor of so many processes on this machine; none for 0.
 
     The processes start from a server that has imported the libraries, and not from a copy of this process,
@@ -98,7 +91,7 @@ def worker_processes(count: int) -> Iterator[Executor | None]:
     context = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     if "forkserver" in methods:
         context.set_forkserver_preload(["fractalcontact.scenes._worker"])
-    executor = ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
+    executor = futures.ProcessPoolExecutor(count, mp_context=context, initializer=_start_worker)
 
     def start() -> None:
         for _ in range(count):
@@ -166,7 +159,7 @@ def _run_on_workers(
 ) -> Iterator[tuple[K, R]]:
     """Give every worker one task at a time; after a stop, running ones finish and no other starts."""
     waiting = iter(tasks.items())
-    running: dict[Future[Any], K] = {}
+    running: dict[futures.Future[Any], K] = {}
     with _mark(store) as mark:
         try:
             while True:
@@ -177,7 +170,7 @@ def _run_on_workers(
                     return
                 if stop and mark is not None:
                     mark.write_text(STOPPING, encoding="utf-8")
-                done, _ = wait(running, timeout=PAUSE, return_when=FIRST_COMPLETED)
+                done, _ = futures.wait(running, timeout=PAUSE, return_when=futures.FIRST_COMPLETED)
                 for future in [future for future in running if future in done]:
                     key = running.pop(future)
                     result, added = _result(future)
@@ -238,13 +231,13 @@ class _MarkedStop(signals.Stop):
         return self.mark.read_text(encoding="utf-8") == STOPPING
 
 
-def _result(future: Future[Any]) -> Any:
+def _result(future: futures.Future[Any]) -> Any:
     """Return the result of a task; the loss of a worker becomes an error of this package."""
     try:
         return future.result()
-    except CancelledError as error:
+    except futures.CancelledError as error:
         raise FractalContactError(f"{LOST}: the scheduler has cancelled the task") from error
-    except BrokenExecutor as error:
+    except futures.BrokenExecutor as error:
         raise FractalContactError(f"{LOST}: a worker process died (memory?)") from error
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # of dask.distributed, which may not be installed

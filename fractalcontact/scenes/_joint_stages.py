@@ -10,16 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
-from fractalcontact.scenes._result_tables import (
-    Column,
-    amount,
-    are_one,
-    at_value,
-    finite,
-    in_turn,
-    length,
-    plain,
-)
+from fractalcontact.scenes._result_tables import Column, amount, are_one, at_value, finite, length, plain
 from fractalcontact.scenes._scene import LOADS
 from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType, stage_type
 from fractalcontact.scenes._surface_stages import AREAS, SLIP_TABLE, SURFACE
@@ -226,9 +217,21 @@ def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
         )
 
 
+def _in_turn(data: xr.Dataset, dim: str) -> Iterator[tuple[str, xr.Dataset]]:
+    """Yield the name of every value of a dim, nothing where there is no such dim, with its results."""
+    if dim not in data.coords:
+        yield "", data
+        return
+    values = np.atleast_1d(data[dim].values)
+    scale = scale_for("m", values) if values.dtype.kind == "f" else None
+    for place, value in enumerate(values):
+        state = data.isel({dim: place}) if dim in data.dims else data
+        yield scale.text(value) if scale is not None else str(value), state
+
+
 def _uplift_remarks(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield whether the joint has more or less uplift than the guidelines assume."""
-    for shear, state in in_turn(data, "shear"):
+    for shear, state in _in_turn(data, "shear"):
         joint, arm = (state[name].sel(diagram="joint") for name in ("uplift_force", "uplift_arm"))
         place = f"at shear {shear}: " if shear else ""
         if not np.isfinite(joint.values).all():

@@ -7,7 +7,7 @@ tables of all stages over the same shears, directions or loads joined.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -300,15 +300,3 @@ def are_one(values: Array) -> bool:
 def length(value: Any) -> str:
     """Return a length in metres with the prefix that suits it."""
     return quantity_text(value, "m")
-
-
-def in_turn(data: xr.Dataset, dim: str) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the name of every value of a dim, nothing where there is no such dim, with its results."""
-    if dim not in data.coords:
-        yield "", data
-        return
-    values = np.atleast_1d(data[dim].values)
-    scale = scale_for("m", values) if values.dtype.kind == "f" else None
-    for place, value in enumerate(values):
-        state = data.isel({dim: place}) if dim in data.dims else data
-        yield scale.text(value) if scale is not None else str(value), state

@@ -26,22 +26,8 @@ import numpy as np
 import xarray as xr
 
 import fractalcontact
-from fractalcontact.base.errors import (
-    FractalContactError,
-    FractalContactWarning,
-    InvalidInput,
-    UnreadableFile,
-    warn,
-)
+from fractalcontact.base import errors, files
 from fractalcontact.base.file_contents import read_headers
-from fractalcontact.base.files import (
-    PARTIAL_RESULT,
-    RESULT,
-    WHERE,
-    clear_partial,
-    output_folder,
-    written_whole,
-)
 from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import encoded
 from fractalcontact.base.signals import Stopped
@@ -73,16 +59,16 @@ def results_folder(out: str | os.PathLike[str] | None, scene: Scene, *, force: b
     if out is None:
         yield None
         return
-    with Problems(WHERE) as problems:
+    with Problems(files.WHERE) as problems:
         is_path = problems.path("out", out, what="the path of a folder")
         if is_path and not force and Path(out).is_dir():
             _check(Path(out), scene, problems)
     is_new = not Path(out).exists()
-    folder = output_folder(out)
+    folder = files.output_folder(out)
     try:
         yield folder
-    except FractalContactError as error:
-        kept = any(folder.glob(f"**/{FOLDER}/*.npz")) or any(folder.glob(f"**/{RESULT}"))
+    except errors.FractalContactError as error:
+        kept = any(folder.glob(f"**/{FOLDER}/*.npz")) or any(folder.glob(f"**/{files.RESULT}"))
         if is_new and not kept and not isinstance(error, Stopped):
             shutil.rmtree(folder, ignore_errors=True)
         raise
@@ -106,7 +92,7 @@ def _check(folder: Path, scene: Scene, problems: Problems) -> None:
         problems.add("out", f"a folder without files of others under these names ({REMEDY})", got)
         return
     own = _identity({"title": scene.name, **scene.tables})
-    for name in (RESULT, PARTIAL_RESULT):
+    for name in (files.RESULT, files.PARTIAL_RESULT):
         other = _scene_of(folder / name)
         if other is not None and _identity(other) != own:
             got = Words(f"{folder.name!r} with those of {other.get('title', 'another one')!r}")
@@ -116,12 +102,12 @@ def _check(folder: Path, scene: Scene, problems: Problems) -> None:
 
 def is_foreign(path: Path) -> bool:
     """Return whether a file has a name that a study writes, and was not written by this package."""
-    if path.name in (RESULT, PARTIAL_RESULT):
+    if path.name in (files.RESULT, files.PARTIAL_RESULT):
         return _scene_of(path) is None
     if path.name == REPORT:
         return not is_report(path)
     if path.name in (TABLES, DATASHEET, CSV):
-        return _scene_of(path.with_name(RESULT)) is None
+        return _scene_of(path.with_name(files.RESULT)) is None
     return path.suffix == ".png" and not is_figure(path)
 
 
@@ -155,7 +141,7 @@ def _scene_of(path: Path) -> dict[str, Any] | None:
         return None
     try:
         root = read_headers(path, lambda _: False)["/"]
-    except UnreadableFile:
+    except errors.UnreadableFile:
         return None
     scene = scene_of(root)
     return {"title": root.attrs.get("title")} | scene if scene else None
@@ -195,7 +181,7 @@ class PartStore:
             return _read_part(path)
         except _DAMAGED:
             message = f"{FOLDER}/{path.name} is damaged or of another origin; that part is computed again"
-            warn(message, FractalContactWarning)
+            errors.warn(message, errors.FractalContactWarning)
             return None
 
     def put(self, key: str, result: xr.Dataset) -> None:
@@ -248,12 +234,12 @@ def _write_part(result: xr.Dataset, path: Path) -> None:
     header = json.dumps(_plain(content | {"attrs": result.attrs}, arrays))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        clear_partial(path.parent)
-        with written_whole(path) as temporary, temporary.open("wb") as file:
+        files.clear_partial(path.parent)
+        with files.written_whole(path) as temporary, temporary.open("wb") as file:
             _write_arrays(file, {_HEADER: np.array(header)} | arrays)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InvalidInput(
+        raise errors.InvalidInput(
             "fractalcontact.scenes.run", [f"out: {path.name!r} cannot be written here: {reason}"]
         ) from error
 

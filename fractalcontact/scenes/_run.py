@@ -30,22 +30,12 @@ from fractalcontact.base.resources import DRAWING_LOCK, most_workers
 from fractalcontact.base.schema import label
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes import _results_folder
+from fractalcontact.scenes import _result_tree, _results_folder
 from fractalcontact.scenes._executor import Workers, run_tasks, worker_processes, workers_of
 from fractalcontact.scenes._export import MAP_DIMS, tables
 from fractalcontact.scenes._html_report import page_contents, pictures_of, write_report
 from fractalcontact.scenes._inputs import read_surface
 from fractalcontact.scenes._result_tables import SCAN
-from fractalcontact.scenes._result_tree import (
-    OVERVIEW,
-    PARTIAL,
-    in_words,
-    main_results,
-    note_run_time,
-    pictured,
-    pooled,
-    result_tree,
-)
 from fractalcontact.scenes._results_folder import REPORT, SCANS, PartStore, digest_of, folder_of, with_seeds
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._scene_file import scans_of
@@ -173,16 +163,18 @@ def _run_scans(
                 done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
                 raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
             groups = studies.groups()
-            tree = result_tree(scene, StudyResults(groups, studies.seconds), pooled(studies.main()))
-            note_run_time(tree, start)
+            tree = _result_tree.result_tree(
+                scene, StudyResults(groups, studies.seconds), _result_tree.pooled(studies.main())
+            )
+            _result_tree.note_run_time(tree, start)
             tree.attrs["caveats"] = "none"
             together.add(tree)
         with _beside_the_result():
-            frame = next(iter(tables(tree[OVERVIEW].to_dataset()).values()))
+            frame = next(iter(tables(tree[_result_tree.OVERVIEW].to_dataset()).values()))
             with written_whole(folder / _results_folder.CSV) as temporary:
                 frame.to_csv(temporary, index=False)
             is_drawn = scene.want.figures and studies.numbers
-            figures = _draw(pictured(tree), folder, progress) if is_drawn else []
+            figures = _draw(_result_tree.pictured(tree), folder, progress) if is_drawn else []
             _results_folder.remove_old_figures(folder, figures)
             with pictures_of(figures) as pictures:
                 whole = summary_of(tree)
@@ -237,10 +229,10 @@ def _run(
     for name in ("contact", "joints/closure"):
         if name in study.groups:
             warn_of(implausible_result(name, study.groups[name]))
-    tree = result_tree(scene, study)
+    tree = _result_tree.result_tree(scene, study)
     if not study.failures:
         tree.attrs.update(facts)
-    note_run_time(tree, start)
+    _result_tree.note_run_time(tree, start)
     if folder is None:
         return tree, None
     if study.missing:
@@ -257,7 +249,7 @@ def _run(
     figures, (contents, whole) = results[0], results[1]
     with _beside_the_result(), pictures_of(figures) as pictures:
         if scene.want.figures:
-            note_run_time(tree, start)
+            _result_tree.note_run_time(tree, start)
             _results_folder.remove_old_figures(folder, figures)
         whole = replace(whole, stages=stage_rows(tree))  # with the time of the figures
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
@@ -359,7 +351,7 @@ class _ScanTask:
             for name in (RESULT, REPORT):
                 (self.folder / name).unlink(missing_ok=True)
             tree = _study_scan(self.scene, self.folder, stop, {DIGEST: digest})
-            return str(tree.attrs.get("completeness", "")).removeprefix(PARTIAL), _numbers(tree)
+            return str(tree.attrs.get("completeness", "")).removeprefix(_result_tree.PARTIAL), _numbers(tree)
         except signals.Stopped:
             return None
         except Exception as error:  # whatever it is, the other scans go on, and the table states it
@@ -428,7 +420,7 @@ class ScanStudies:
             self.reasons[name] = NO_ACCESS if numbers else reason
             return
         if not self.numbers:  # the groups of all scans come before those of each
-            paths = (OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars))
+            paths = (_result_tree.OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars))
             file.add_groups({f"/{path}": xr.Dataset() for path in paths})
         self.reasons[name], self.numbers[name] = reason, numbers
         place = f"/{SCANS}/{result.parent.name}"
@@ -456,7 +448,7 @@ class ScanStudies:
 
     def groups(self) -> Numbers:
         """Return the numbers of all scans along `scan`, and the overview."""
-        groups = {OVERVIEW: self._overview()}
+        groups = {_result_tree.OVERVIEW: self._overview()}
         for path in dict.fromkeys(path for each in self.numbers.values() for path in each if path):
             having = {name: each[path] for name, each in self.numbers.items() if path in each}
             if any(data.data_vars for data in having.values()):
@@ -465,7 +457,7 @@ class ScanStudies:
 
     def main(self) -> xr.Dataset:
         """Return the main results of all scans, NaN where a scan has none."""
-        mains = {name: main_results(groups) for name, groups in self.numbers.items()}
+        mains = {name: _result_tree.main_results(groups) for name, groups in self.numbers.items()}
         table = xr.Dataset(coords={SCAN: list(self.reasons)})
         for key in dict.fromkeys(key for main in mains.values() for key in main.data_vars):
             found = {name: main[key] for name, main in mains.items() if key in main}
@@ -476,7 +468,7 @@ class ScanStudies:
     def _overview(self) -> xr.Dataset:
         """Return a row for every scan: what stands for its study, whether it failed, and why."""
         names, roots = list(self.reasons), {name: each[""] for name, each in self.numbers.items()}
-        table = in_words(self.main(), with_group=False)
+        table = _result_tree.in_words(self.main(), with_group=False)
         table["status"] = (
             SCAN,
             [

@@ -17,16 +17,8 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.resources import Plane, bytes_on, map_bytes, require_memory
 from fractalcontact.base.tables import screen_width, table
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes import _domain_stages, _joint_stages, _surface_stages
+from fractalcontact.scenes import _domain_stages, _inputs, _joint_stages, _surface_stages
 from fractalcontact.scenes._domain_stages import SIGNATURE
-from fractalcontact.scenes._inputs import (
-    block_shape,
-    call_options,
-    generator_options,
-    stage_options,
-    surface_grid,
-    values_of,
-)
 from fractalcontact.scenes._scene import LOADS, Scene
 from fractalcontact.scenes._stage_type import (
     CONTACT_MAPS,
@@ -200,7 +192,8 @@ def stages_of(scene: Scene) -> tuple[Stage, ...]:
             _needs(row, reasons, scene),
             reasons[name],
             stored=name != "surfaces" or reasons[name] != "input",
-            whole_path=row.whole_path or (row.takes == "map" and "total_stress" in values_of(scene, row)),
+            whole_path=row.whole_path
+            or (row.takes == "map" and "total_stress" in _inputs.values_of(scene, row)),
         )
         for name, row in STAGES.items()
         if name in reasons
@@ -248,7 +241,7 @@ def _reasons(scene: Scene) -> dict[str, str]:
             if reasons.keys().isdisjoint(names):
                 reasons[last] = f"{row.word} needs it"
     if any(STAGES[name].group == "joints" for name in reasons):
-        if want.figures and "shear" in values_of(scene, STAGES["joints/delta_surface"]):
+        if want.figures and "shear" in _inputs.values_of(scene, STAGES["joints/delta_surface"]):
             reasons.setdefault("joints/delta_surface", "figures are wanted")
         if scene.upper is not None:
             registered = " and registered" if scene.joint.register else ""
@@ -265,7 +258,7 @@ def _needs(row: StageType, planned: dict[str, str], scene: Scene) -> tuple[str, 
 
 def _has_signature(row: StageType, scene: Scene) -> bool:
     """Whether the options of a stage are those of the signature of the study."""
-    options, own = (stage_options(scene, each) for each in (row, STAGES[SIGNATURE]))
+    options, own = (_inputs.stage_options(scene, each) for each in (row, STAGES[SIGNATURE]))
     return all(options.get(key) == own.get(key) for key in STAGES[SIGNATURE].arguments())
 
 
@@ -282,10 +275,10 @@ def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | Non
     if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
         return {}
     try:
-        shape, spacing = surface_grid(scene, face)
+        shape, spacing = _inputs.surface_grid(scene, face)
     except InvalidInput:
         return {}
-    surface, block = Plane(shape, generator in PERIODIC), Plane(block_shape(scene, shape, spacing))
+    surface, block = Plane(shape, generator in PERIODIC), Plane(_inputs.block_shape(scene, shape, spacing))
     held = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
     loaded: set[str] = set()
     peaks = {}
@@ -300,7 +293,7 @@ def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | Non
             continue
         takes = stage.row.takes
         plane = surface if takes == "surface" or (takes == "map" and scene.is_pressed) else block
-        options = call_options(scene, stage.row, stage.keep)
+        options = _inputs.call_options(scene, stage.row, stage.keep)
         steps, shears = _count(options, LOADS), _count(options, ("shear",))
         section = section_length(steps, int(plane.cells), has_hardness="hardness" in options)
         planes = section if stage.reads_part else steps * shears if stage.reads_map else 1
@@ -340,7 +333,7 @@ def _surface_memory(scene: Scene, plane: Plane) -> float:
     if table.generate is None:
         return 24.0 * plane.cells  # bytes while a file is read
     function = public_function(f"surfaces.{table.generate}")
-    members = int(generator_options(table).get("members") or 1)
+    members = int(_inputs.generator_options(table).get("members") or 1)
     return bytes_on(function.memory, replace(plane, planes=members), {})  # type: ignore[attr-defined]
 
 

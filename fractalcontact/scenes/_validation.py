@@ -25,13 +25,6 @@ from fractalcontact.base.schema import label
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes import _inputs
-from fractalcontact.scenes._inputs import (
-    call_options,
-    contact_modulus,
-    crack_of,
-    stage_options,
-    values_of,
-)
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import check_tables, parse, scans_of
 from fractalcontact.scenes._scene_keys import GENERATORS
@@ -214,7 +207,7 @@ def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Prob
     if "surface" not in surfaces or (scene.want.joints and scene.upper and "upper" not in surfaces):
         return None
     with problems.collect("joint: "):
-        return crack_of(scene, surfaces["surface"], surfaces.get("upper"))
+        return _inputs.crack_of(scene, surfaces["surface"], surfaces.get("upper"))
     return None
 
 
@@ -235,10 +228,10 @@ def _validate_calls(
                 subject = crack
                 own_block = scene.joint.stages.get(row.word, {}).get("block")
                 if crack is not None and own_block is not None and _is_valid(problems, f"{row.table}.block"):
-                    subject = crack_of(scene, surfaces["surface"], surfaces.get("upper"), row)
+                    subject = _inputs.crack_of(scene, surfaces["surface"], surfaces.get("upper"), row)
             elif row.takes == "map":
                 subject = _empty_maps(scene, surface, crack, row)
-            _validate_call(row.function, subject, **call_options(scene, row, stage.keep))
+            _validate_call(row.function, subject, **_inputs.call_options(scene, row, stage.keep))
 
 
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
@@ -257,7 +250,7 @@ def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
     rows, columns = crack.layout.slices
     block = crack.lower.isel(y=rows, x=columns)
     gap = block.copy(data=np.broadcast_to(0.0, block.shape))
-    options = stage_options(scene, STAGES["joints/closure"])
+    options = _inputs.stage_options(scene, STAGES["joints/closure"])
     path = next((real_numbers(options[key]) for key in LOADS if key in options), None)
     if path is None or path.ndim > 1:  # a problem of the closure, which is listed there
         path = np.zeros(1)
@@ -301,18 +294,18 @@ def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
     if slope > 3.0:  # cracks, grounds and grinds are below 1
         yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
     if scene.is_pressed:
-        options = stage_options(scene, STAGES["contact"])
+        options = _inputs.stage_options(scene, STAGES["contact"])
         yield from _high_pressures("contact", options, grid.nominal_area, float(options["contact_modulus"]))
     material = scene.material
     stages = [
         name for name in ("closure", "area_by_resolution", "elastic_dilatancy") if name in scene.want.joints
     ]
     if stages and material.young is not None and material.poisson is not None:
-        modulus = contact_modulus(material)
+        modulus = _inputs.contact_modulus(material)
         block = grid.extent if scene.joint.block is None else scene.joint.block
         area = float(np.prod(np.broadcast_to(block, 2)))
         for name in stages:
-            loads = values_of(scene, STAGES[f"joints/{name}"])
+            loads = _inputs.values_of(scene, STAGES[f"joints/{name}"])
             yield from _high_pressures(f"joint.{name}", loads, area, modulus)
 
 
