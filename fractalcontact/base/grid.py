@@ -124,10 +124,7 @@ def contact_edges(mask: Array, periodic: Sequence[bool] = (False, False)) -> Arr
     mask = np.asarray(mask, dtype=bool)
     counts = []
     for axis, wraps in zip((-2, -1), periodic, strict=True):
-        last = [slice(None)] * mask.ndim
-        first = [slice(None)] * mask.ndim
-        last[axis], first[axis] = slice(1, None), slice(None, -1)
-        changes = np.count_nonzero(mask[tuple(last)] != mask[tuple(first)], axis=(-2, -1))
+        changes = np.count_nonzero(np.diff(mask, axis=axis), axis=(-2, -1))  # True where two cells differ
         if wraps and mask.shape[axis] > 1:
             edge = np.take(mask, 0, axis=axis) != np.take(mask, -1, axis=axis)
             changes = changes + np.count_nonzero(edge, axis=-1)

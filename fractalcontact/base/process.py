@@ -35,12 +35,9 @@ TOKEN, MOST_CALLS = 2, 1 << 15  # bytes of a number, and numbers that a pipe of 
 
 def peak_memory() -> int:
     """Return the peak memory of this process in bytes; 0 where the system does not report it."""
-    status = Path("/proc/self/status")
-    if status.is_file():
-        # not getrusage: on Linux its peak starts with the memory of the parent process
-        lines = (line.partition(":") for line in status.read_text(encoding="utf-8").splitlines())
-        values = {name: value for name, _, value in lines}
-        return int(values.get("VmHWM", "0 kB").split()[0]) * 1024
+    status = resources.numbers_in(Path("/proc/self/status"))
+    if status:  # not getrusage: on Linux its peak starts with the memory of the parent process
+        return status.get("VmHWM", 0) * 1024
     try:
         import resource
     except ImportError:

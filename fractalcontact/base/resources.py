@@ -75,7 +75,7 @@ def free_memory(root: Path = Path("/")) -> Free:
 
 def _free_of_machine(root: Path) -> Free:
     """Return the free memory of the machine, all of it where the system does not say how much is free."""
-    lines = _numbers(root / "proc/meminfo")
+    lines = numbers_in(root / "proc/meminfo")
     if "MemAvailable" in lines:
         return Free(1024.0 * (lines["MemAvailable"] + lines.get("SwapFree", 0)), "free memory of the machine")
     try:
@@ -87,7 +87,7 @@ def _free_of_machine(root: Path) -> Free:
 
 def _free_of_process(root: Path) -> Iterator[Free]:
     """Yield what the limits of the process leave beside the libraries; below 0, these do not fit (Linux)."""
-    status = _numbers(root / "proc/self/status")
+    status = numbers_in(root / "proc/self/status")
     if not status:
         return
     import resource
@@ -148,7 +148,7 @@ def _free_of_group(folder: Path, limit: str, used: str, prefix: str) -> Free | N
     if not all(word.isdecimal() for word in words):
         return None
     most, taken = (float(word) for word in words)
-    pages = _numbers(folder / "memory.stat")
+    pages = numbers_in(folder / "memory.stat")
     files = sum(pages.get(f"{prefix}{kind}_file", 0) for kind in ("active", "inactive"))
     return Free(max(0.0, most - max(0.0, taken - files)), "limit of the control group (container or job)")
 
@@ -160,7 +160,7 @@ def _lines(path: Path) -> list[str]:
         return []
 
 
-def _numbers(path: Path) -> dict[str, int]:
+def numbers_in(path: Path) -> dict[str, int]:
     """Return the whole numbers of a file of lines such as `VmSize:  1024 kB` by their names."""
     pairs = (line.replace(":", " ").split()[:2] for line in _lines(path))
     return {pair[0]: int(pair[1]) for pair in pairs if len(pair) == 2 and pair[1].isdecimal()}

@@ -148,11 +148,7 @@ def radial_average(
         return np.bincount(ring, weights.ravel(), minlength=rings + 2)[1 : rings + 1]
 
     columns = half_weights(shape[1])
-    rows = np.full(half, 2.0)
-    rows[0] = 1.0
-    if ny % 2 == 0:
-        rows[-1] = 1.0
-    weights = np.multiply.outer(rows, columns).ravel()
+    weights = np.multiply.outer(half_weights(ny), columns).ravel()
     counts = sums(weights)
     filled = counts > 0
     weights *= radius

@@ -14,10 +14,9 @@ import xarray as xr
 from fractalcontact.base import provenance
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import datasets_folder
-from fractalcontact.base.netcdf import as_dataset
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
-from fractalcontact.scenes._parts import concatenate
+from fractalcontact.scenes._parts import call, concatenate
 from fractalcontact.scenes._stage_type import public_function
 
 WHERE = "fractalcontact.scenes.reproduce"
@@ -101,12 +100,13 @@ class _Source:
         if "file_sha256" in entry:
             arguments["path"] = self._file(str(arguments["path"]), entry["file_sha256"])
         if "sections" not in entry:
-            return _call(function, arguments)
+            return call(function, **arguments)
         load = provenance.load_of(entry)[0]
         ends = np.cumsum(entry["sections"])[:-1].tolist()
         path = arguments.pop(load)
         sections = [path[start:end] for start, end in zip([0, *ends], [*ends, None], strict=True)]
-        return concatenate([_call(function, {**arguments, load: section}) for section in sections], "step")
+        parts = [call(function, **{**arguments, load: section}) for section in sections]
+        return concatenate(parts, "step")
 
     def _argument(self, name: str, value: Any) -> Any:
         """Return an argument from its summary in the provenance."""
@@ -159,16 +159,10 @@ class _Source:
         raise InvalidInput(WHERE, [f"folder: expected the file {name!r} that was read, got {got}"])
 
 
-def _call(function: Any, arguments: Mapping[str, Any]) -> xr.Dataset:
-    result: xr.Dataset | xr.DataArray = function(**arguments)
-    return as_dataset(result) if isinstance(result, xr.DataArray) else result
-
-
-def _function(call: Any) -> Any:
-    """Return the public function that a provenance names; text of a file calls nothing else."""
-    package, subpackage, function = [*str(call).split("."), "", "", ""][:3]
-    if package == PACKAGE and subpackage in SUBPACKAGES and str(call).count(".") == 2:
-        found = getattr(public_function(f"{subpackage}.{function}"), "validate", None)
-        if found is not None:
-            return public_function(f"{subpackage}.{function}")
-    raise InvalidInput(WHERE, [f"call: expected a public function that returns a result, got {call!r}"])
+def _function(stated: Any) -> str:
+    """Return the name of the public function that a provenance states; text of a file calls nothing else."""
+    package, _, name = str(stated).partition(".")
+    is_known = package == PACKAGE and name.partition(".")[0] in SUBPACKAGES and name.count(".") == 1
+    if not is_known or not hasattr(public_function(name), "validate"):
+        raise InvalidInput(WHERE, [f"call: expected a public function that returns a result, got {stated!r}"])
+    return name
