@@ -42,7 +42,7 @@ from fractalcontact.scenes._scene_file import scans_of
 from fractalcontact.scenes._stages import FIGURES, check_memory, stages_of
 from fractalcontact.scenes._study import Study, StudyResults, reason_of, stacked, study_ensemble
 from fractalcontact.scenes._summary import Summary, datasheet, summary_of
-from fractalcontact.scenes._validation import implausible_result, validated, warn_of
+from fractalcontact.scenes._validation import validated, warn_of_result
 
 DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
 NO_ACCESS = "the worker does not see the folder of the results"
@@ -228,7 +228,7 @@ def _run(
         raise InvalidInput("fractalcontact.scenes.run", study.reasons)
     for name in ("contact", "joints/closure"):
         if name in study.groups:
-            warn_of(implausible_result(name, study.groups[name]))
+            warn_of_result(name, study.groups[name])
     tree = _result_tree.result_tree(scene, study)
     if not study.failures:
         tree.attrs.update(facts)

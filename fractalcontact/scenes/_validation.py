@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
@@ -88,7 +88,7 @@ def validated(scene: Scene | str | os.PathLike[str]) -> tuple[Scene, dict[str, x
         surfaces = _validate_surfaces(scene, problems)
         if _is_valid(problems, "want"):  # or nothing says which calls there are
             _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
-    warn_of(implausible_input(scene, surfaces["surface"]))
+    warn_of_input(scene, surfaces["surface"])
     return scene, {name: face for name, face in surfaces.items() if "generate" not in scene.table(name)}
 
 
@@ -272,12 +272,6 @@ def _empty_maps(
     return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)
 
 
-def warn_of(messages: Iterable[str]) -> None:
-    """Warn of every implausible value."""
-    for message in messages:
-        warn(message, ScaleWarning)
-
-
 def _rms_slope(heights: np.ndarray[Any, Any], spacing: Sequence[float]) -> float:
     squares = [
         np.nanmean((np.diff(heights, axis=axis) / spacing[axis]) ** 2)
@@ -287,43 +281,36 @@ def _rms_slope(heights: np.ndarray[Any, Any], spacing: Sequence[float]) -> float
     return float(np.sqrt(np.sum(squares)))
 
 
-def implausible_input(scene: Scene, surface: xr.DataArray) -> Iterator[str]:
-    """Yield the implausible values of a scene and its surface."""
-    grid = read_grid(surface)
+def warn_of_input(scene: Scene, surface: xr.DataArray) -> None:
+    """Warn of implausible values of a scene and its surface."""
+    grid, material = read_grid(surface), scene.material
     slope = _rms_slope(distinct(surface.values), grid.spacing)
     if slope > 3.0:  # cracks, grounds and grinds are below 1
-        yield f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
-    if scene.is_pressed:
-        options = _inputs.stage_options(scene, STAGES["contact"])
-        yield from _high_pressures("contact", options, grid.nominal_area, float(options["contact_modulus"]))
-    material = scene.material
-    stages = [
-        name for name in ("closure", "area_by_resolution", "elastic_dilatancy") if name in scene.want.joints
-    ]
-    if stages and material.young is not None and material.poisson is not None:
-        modulus = _inputs.contact_modulus(material)
-        block = grid.extent if scene.joint.block is None else scene.joint.block
-        area = float(np.prod(np.broadcast_to(block, 2)))
-        for name in stages:
-            loads = _inputs.values_of(scene, STAGES[f"joints/{name}"])
-            yield from _high_pressures(f"joint.{name}", loads, area, modulus)
-
-
-def _high_pressures(place: str, loads: Mapping[str, Any], area: float, modulus: float) -> Iterator[str]:
-    for key, scale in (("normal_force", area), ("nominal_pressure", 1.0)):
-        if loads.get(key) is not None:
-            highest = float(np.max(loads[key])) / scale
+        message = f"surface: an rms slope of {slope:.3g}; are heights and spacing in the same unit?"
+        warn(message, ScaleWarning)
+    block = grid.extent if scene.joint.block is None else scene.joint.block
+    areas = {"contact": grid.nominal_area} if scene.is_pressed else {}
+    if material.young is not None and material.poisson is not None:
+        names = {"closure", "area_by_resolution", "elastic_dilatancy"}.intersection(scene.want.joints)
+        areas |= {f"joints/{name}": float(np.prod(np.broadcast_to(block, 2))) for name in sorted(names)}
+    for name, area in areas.items():
+        row, loads = STAGES[name], _inputs.values_of(scene, STAGES[name])
+        modulus = float(_inputs.stage_options(scene, row).get("contact_modulus", 0.0))
+        modulus = modulus or _inputs.contact_modulus(material)
+        for key, scale in (("normal_force", area), ("nominal_pressure", 1.0)):
+            highest = 0.0 if loads.get(key) is None else float(np.max(loads[key])) / scale
             if highest > 0.3 * modulus:  # strains are no longer small
-                yield (
-                    f"{place}: {key} gives a mean pressure of {highest:.3g} Pa on a contact modulus of "
+                message = (
+                    f"{row.table}: {key} gives a mean pressure of {highest:.3g} Pa on a contact modulus of "
                     f"{modulus:.3g} Pa; is one of them in another unit?"
                 )
+                warn(message, ScaleWarning)
 
 
-def implausible_result(name: str, result: xr.Dataset) -> Iterator[str]:
-    """Yield the implausible values of a closure law."""
+def warn_of_result(name: str, result: xr.Dataset) -> None:
+    """Warn of implausible values of a closure law."""
     edge = float(result["nominal_area"].max()) ** 0.5
-    if "closure" in result and np.isfinite(result["closure"].values).any():
-        deepest = float(np.nanmax(result["closure"].values))
-        if deepest > 0.5 * edge:  # half-spaces describe closures that are small against the body
-            yield f"{name}: a closure of {deepest:.3g} m of a body {edge:.3g} m wide; is the modulus in Pa?"
+    deepest = float(result["closure"].max()) if "closure" in result else 0.0  # NaN where nothing was solved
+    if deepest > 0.5 * edge:  # half-spaces describe closures that are small against the body
+        message = f"{name}: a closure of {deepest:.3g} m of a body {edge:.3g} m wide; is the modulus in Pa?"
+        warn(message, ScaleWarning)
