@@ -225,13 +225,21 @@ class MemoryStore(PartStore):
 
 
 def _write_part(result: xr.Dataset, path: Path) -> None:
+    """Write a part as JSON, which names the arrays beside it."""
     arrays: dict[str, np.ndarray[Any, Any]] = {}
+
+    def put(value: Any) -> dict[str, str]:
+        """Return in place of an array, or a number of NumPy, the name under which it is written."""
+        name, values = f"array{len(arrays)}", np.asarray(value)
+        arrays[name] = values.astype(str) if values.dtype == object else values
+        return {_ARRAY: name}
+
     parts = {"data_vars": result.data_vars, "coords": result.coords}
     content: dict[str, Any] = {
-        place: {name: [list(each.dims), each.values, each.attrs] for name, each in variables.items()}
+        place: {name: [each.dims, each.values, each.attrs] for name, each in variables.items()}
         for place, variables in parts.items()
     }
-    header = json.dumps(_plain(content | {"attrs": result.attrs}, arrays))
+    header = json.dumps(content | {"attrs": result.attrs}, default=put)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         files.clear_partial(path.parent)
@@ -256,33 +264,15 @@ def _read_part(path: Path) -> xr.Dataset:
     """Return a part; raise one of `_DAMAGED` if it is not as it was written."""
     with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}  # the archive has a checksum of each
-    header = _restored(json.loads(str(arrays.pop(_HEADER))), arrays)
+
+    def take(value: dict[str, Any]) -> Any:
+        return arrays[value[_ARRAY]][()] if value.keys() == {_ARRAY} else value
+
+    header = json.loads(str(arrays.pop(_HEADER)), object_hook=take)
     variables, coordinates = (
         {name: tuple(each) for name, each in header[place].items()} for place in ("data_vars", "coords")
     )
     return with_load_indexes(encoded(xr.Dataset(variables, coordinates, header["attrs"])))
-
-
-def _plain(value: Any, arrays: dict[str, np.ndarray[Any, Any]]) -> Any:
-    """Return a result as types of JSON; arrays and NumPy numbers go into `arrays`, which keeps their type."""
-    if isinstance(value, dict):
-        return {str(key): _plain(item, arrays) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item, arrays) for item in value]
-    if isinstance(value, (np.ndarray, np.generic)):
-        name, values = f"array{len(arrays)}", np.asarray(value)
-        arrays[name] = values.astype(str) if values.dtype == object else values
-        return {_ARRAY: name}
-    return value
-
-
-def _restored(value: Any, arrays: Mapping[str, np.ndarray[Any, Any]]) -> Any:
-    """Undo `_plain`."""
-    if isinstance(value, list):
-        return [_restored(item, arrays) for item in value]
-    if isinstance(value, dict) and _ARRAY in value:
-        return arrays[value[_ARRAY]][()]
-    return {key: _restored(item, arrays) for key, item in value.items()} if isinstance(value, dict) else value
 
 
 def with_seeds(scene: Scene, store: PartStore) -> Scene:
