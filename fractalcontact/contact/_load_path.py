@@ -276,14 +276,15 @@ def flat_contact(problem: Problem, control: Control, tolerance: float) -> Soluti
 
 def press_punch(
     step: Step,
-    guess: Array | None,
+    rise: Array | None,
     *,
     # on rough surfaces of 128 x 128 nodes the stiffness is off by up to 2e-5; .03 left 4e-4 for 3 % fewer
     # transforms of a partial slip, .003 3e-6 for 2 % more
     tolerance: float = 1e-2,
 ) -> Step | None:
-    """Press a punch with the contact of `step` as its base, from a pressure; None where there is no contact.
+    """Press a punch with the contact of `step` as its base; None where there is no contact.
 
+    It starts from the `rise` of the pressure over one step, roughly the derivative of the pressure.
     Its stiffness is that of the contact (Barber 2003): a node at the edge of a contact bears no pressure, so
     that nodes that come into contact add nothing to the force at first. Away from the base the gap is more
     than the punch can close: its closure is at most that of `step`, whose stiffness grows with the load, and
@@ -303,4 +304,5 @@ def press_punch(
         hardness=np.inf,
         tolerance=max(step.path.tolerance, tolerance),
     )
+    guess = None if rise is None else np.where(step.contact, rise, 0.0)
     return next(solve_path(path, lambda _: guess))

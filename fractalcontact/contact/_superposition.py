@@ -202,6 +202,7 @@ class Superposition:
 
     def __init__(
         self,
+        first: Step,
         states: Sequence[ShearState],
         numbers: dict[float, int],
         shear: ShearPath,
@@ -211,6 +212,8 @@ class Superposition:
         stiffness: bool = True,
     ) -> None:
         self.states, self.numbers, self.names = states, numbers, names
+        self.normal, self.contact = first, first.contact
+        self.pressure = first.pressure[self.contact]
         self.shear, self.cell_area = shear, cell_area
         self.latest = [numbers[s.branches[-1].force] if s.branches else 0 for s in states]
         used = [{0, *(numbers[b.force] for b in s.branches)} for s in states]
@@ -219,23 +222,20 @@ class Superposition:
         self.has_stiffness = stiffness
         self.rows: list[dict[str, float]] = []  # of the normal solutions
         self.sticks: dict[int, Array] = {}  # nodes in contact that stick, by number of the solution
-        self.fields: dict[str, Array] = {}  # (step, nodes)
+        kinds = sorted({name[:-2] for name in names if name != "slip_state"})  # traction, slip
+        self.fields = {kind: np.zeros((len(states), self.pressure.size)) for kind in kinds}  # (step, nodes)
         self.last_pressure: Array | None = None  # scaled
 
     def add(self, step: Step) -> None:
         """Take the next normal solution."""
         number = len(self.rows)
-        if number == 0:
-            self.normal, self.contact = step, step.contact
-            self.pressure = step.pressure[self.contact]
-            names = {name[:-2] for name in self.names if name != "slip_state"}  # traction, slip
-            self.fields = {name: np.zeros((len(self.states), self.pressure.size)) for name in sorted(names)}
         pressure, gap = step.pressure[self.contact], step.gap[self.contact]
         stick = step.contact[self.contact]
         cells = int(np.count_nonzero(stick))
         punch = None
         if self.has_stiffness and number in self.latest:
-            punch = press_punch(step, self.expected_slope(step))
+            last, this = self.last_pressure, step.solution.pressure
+            punch = press_punch(step, None if last is None else np.maximum(last - this, 0.0))
         self.last_pressure = step.solution.pressure
         solutions = [step.solution] if punch is None else [step.solution, punch.solution]
         self.rows.append(
@@ -260,12 +260,6 @@ class Superposition:
             if factor:
                 for name, field in self.fields.items():
                     field[row] += factor * change[name]
-
-    def expected_slope(self, step: Step) -> Array | None:
-        """Return roughly the derivative of the scaled pressure at `step`: that from the solution before."""
-        if self.last_pressure is None:
-            return None
-        return np.where(step.contact, np.maximum(self.last_pressure - step.solution.pressure, 0.0), 0.0)
 
     def columns(self) -> dict[str, Array]:
         """Return the scalars of all steps."""

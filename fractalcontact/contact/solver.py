@@ -193,23 +193,19 @@ def _scalars(step: Step, grid: Grid) -> dict[str, Any]:
 
 def _stiffness(step: Step, before: Step | None, grid: Grid) -> float:
     """Return the derivative of the nominal pressure by the closure, Pa/m; NaN where it has no bound."""
-    if not step.force > 0:
-        return 0.0 if step.force == 0 else np.nan
-    guess = None
-    if before is not None:  # roughly the derivative of the pressure
-        change = np.abs(step.solution.pressure - before.solution.pressure)
-        guess = np.where(step.contact, change, 0.0)
-    stiffness = normal_stiffness(step, guess) / grid.nominal_area
+    rise = None if before is None else np.abs(step.solution.pressure - before.solution.pressure)
+    stiffness = normal_stiffness(step, rise) / grid.nominal_area
     return stiffness if np.isfinite(stiffness) else np.nan
 
 
-def normal_stiffness(step: Step, guess: Array | None = None) -> float:
+def normal_stiffness(step: Step, rise: Array | None = None) -> float:
     """Return the derivative of the force by the closure, N/m: 0 without contact, else that of a punch.
 
-    `guess` is a pressure to start from. Infinite in full contact of a periodic body.
+    `rise` is that of the pressure from which `press_punch` starts. Infinite in full contact of a periodic
+    body, NaN under a force that is not determined.
     """
-    punch = press_punch(step, guess)
-    return 0.0 if punch is None else punch.stiffness
+    punch = press_punch(step, rise)
+    return 0.0 * step.force if punch is None else punch.stiffness
 
 
 def _pressure_distribution(pressure: Array) -> dict[str, Any]:
@@ -287,7 +283,7 @@ def solve_shear(
         next(steps)  # the first one
     wanted = ("traction_x",) if method == "full" else keep  # where the full method starts from
     superposition = Superposition(
-        states, numbers, shear, grid.cell_area, wanted, stiffness=method == "superposition"
+        first, states, numbers, shear, grid.cell_area, wanted, stiffness=method == "superposition"
     )
     for step in track(chain([first], steps), progress, "partial_slip", total=len(reduced)):
         superposition.add(step)
