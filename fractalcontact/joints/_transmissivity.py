@@ -212,10 +212,7 @@ def gap_flows(
         All cells (flat indices) in the order in which elimination takes them.
     """
     gap = _flow_network.conducting(gap)
-    largest = float(gap.max())
-    if not largest > 0:
-        return [_no_flow(gap.shape)] * len(axes)
-    unit = power_of_two(largest)
+    unit = power_of_two(float(gap.max()))
     cells = (gap / unit) ** 3
     network = _flow_network.link_network(cells, ratio, wraps)
     flows = [_flow_along(axis, network, cells, ratio, order, repeats=wraps[axis]) for axis in axes]

@@ -45,14 +45,11 @@ SHORT = {
     **dict.fromkeys(("contact_stiffness", "stiffness", "interface_stiffness"), "normal stiffness"),
 }
 # names that say it shorter than the long name of the schema
-OWN_NAME = frozenset(
-    {
-        "height", "nominal_pressure", "tangential_displacement", "coverage", "friction_angle",
-        "dilatancy_angle", "shear_displacement", "hydraulic_aperture", "mean_gap", "variogram",
-        "second_variogram", "madogram", "lag", "power_spectral_density", "spot_size", "gap_size",
-        "pair_correlation_length",
-    }
-)  # fmt: skip
+OWN_NAME = ("height", "nominal_pressure", "tangential_displacement", "coverage", "friction_angle",
+            "dilatancy_angle", "shear_displacement", "hydraulic_aperture", "mean_gap", "variogram",
+            "second_variogram", "madogram", "lag", "power_spectral_density", "spot_size", "gap_size",
+            "pair_correlation_length")  # fmt: skip
+SHORT |= {name: name.replace("_", " ") for name in OWN_NAME}
 PLAIN = Scale(1.0, "")  # of a number without a unit
 PER_CENT = Scale(0.01, "%")  # of a share
 # shown in per cent
@@ -126,8 +123,6 @@ def number_texts(scale: Scale, values: Any, digits: int) -> list[str]:
 def name_of(data: xr.DataArray) -> str:
     """Return the name of a variable on axes and in legends."""
     name = str(data.name)
-    if name in OWN_NAME:
-        return name.replace("_", " ")
     quantity = QUANTITIES.get(name)
     long_name = data.attrs.get("long_name") or (quantity.long_name if quantity else name)
     return SHORT.get(name, str(long_name))
