@@ -170,10 +170,8 @@ class Crack:
             ("faces", f"{faces} of {ny} x {nx} cells, {dy} x {dx} apart"),
             ("block", f"{by} x {bx} cells, {edges}"),
         ]
-        if self.young is not None:
-            facts.append(("young", _words(self.young, "Pa")))
-        if self.poisson is not None:
-            facts.append(("poisson", _words(self.poisson, "1")))
+        for name, value, units in (("young", self.young, "Pa"), ("poisson", self.poisson, "1")):
+            facts += [] if value is None else [(name, _words(value, units))]
         return [*facts, ("basic_friction_angle", quantity_text(self.basic_friction_angle, "degree"))]
 
     @property

@@ -211,7 +211,7 @@ def uplift(
     leading = tuple(str(dim) for dim in gap.dims[:-2])
     pressure = np.reshape([low + drop * state.pressure for state in states], gap.shape)
     axis = flow.sides[0].axis
-    drain_places = flow.sense * (_from_edge(gap, axis, points[:, 1 - axis]) - flow.sides[0].place)
+    drain_places = flow.distances(_from_edge(gap, axis, points[:, 1 - axis]))
     knots = _diagrams(flow, (upstream_pressure, low), drain_share, drain_places)
     result = _forces(pressure, flow, knots, leading)
     for axis, name in enumerate(("uplift_y", "uplift_x")):
@@ -344,12 +344,9 @@ class HeldFlow:
         beyond = downstream.place if same_axis else 0.5 * self.grid.extent[upstream.axis]
         return 1.0 if beyond > upstream.place else -1.0
 
-    def distances(self, *, both_ends: bool = False) -> Array:
-        """Return the distance (m) of rows of cells, or of both ends of the plane, from the upstream side."""
-        upstream = self.sides[0]
-        spacing, n = self.grid.spacing[upstream.axis], self.grid.shape[upstream.axis]
-        places = np.array([0.0, n]) if both_ends else np.arange(n) + 0.5
-        return self.sense * (places * spacing - upstream.place)
+    def distances(self, places: Any) -> Any:
+        """Return the distance (m) of places from the low edge of the plane (m) from the upstream side."""
+        return self.sense * (places - self.sides[0].place)
 
 
 class State(NamedTuple):
@@ -483,7 +480,8 @@ def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float, drains: A
     (upstream, downstream), (high, low) = flow.sides, ends
     if upstream.axis != downstream.axis:
         return {}
-    reach, last = abs(downstream.place - upstream.place), np.sort(flow.distances(both_ends=True))
+    reach = abs(downstream.place - upstream.place)
+    last = np.sort(flow.distances(np.array([0.0, flow.grid.extent[upstream.axis]])))
     knots = {"linear": (np.array([last[0], 0.0, reach, last[1]]), np.array([high, high, low, low]))}
     drain = float(drains.mean()) if drains.size else math.nan
     if 0.0 < drain < reach:
@@ -494,8 +492,9 @@ def _diagrams(flow: HeldFlow, ends: tuple[float, float], share: float, drains: A
 
 def _cell_means(flow: HeldFlow, place: Array, pressure: Array) -> Array:
     """Return the means over the rows of cells of a pressure that is linear between places (m)."""
-    half = 0.5 * flow.grid.spacing[flow.sides[0].axis]
-    edges = flow.distances()[:, None] + [-half, half]
+    axis = flow.sides[0].axis
+    spacing, half = flow.grid.spacing[axis], 0.5 * flow.grid.spacing[axis]
+    edges = flow.distances((np.arange(flow.grid.shape[axis]) + 0.5) * spacing)[:, None] + [-half, half]
     # where the pressure breaks inside a row, it is integrated from edge to break to edge
     corners = np.clip(place, *np.split(edges, 2, axis=1))
     at = np.sort(np.concatenate([edges, corners], axis=1), axis=1)
@@ -510,7 +509,7 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
     profile, mean = filled.mean(axis=-2 if axis == 1 else -1), filled.mean(axis=(-2, -1))
     centres = [_centre(filled, 0, grid), _centre(filled, 1, grid)]
     # of the joint, then of each diagram: mean, arm, y and x
-    rows, profiles = [(mean, flow.sense * (centres[axis] - upstream.place), *centres)], [profile]
+    rows, profiles = [(mean, flow.distances(centres[axis]), *centres)], [profile]
     for place, p in knots.values():
         a, b, step = p[:-1] / p[0], p[1:] / p[0], np.diff(place)
         force = (a + b) / 2.0 * step
