@@ -54,8 +54,8 @@ class Operator(ABC):
         self.transforms = 0.0
 
     @abstractmethod
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the displacement under `pressure`, both (ny, nx); an operator may write it into `out`."""
+    def apply(self, pressure: Array) -> Array:
+        """Return the displacement under `pressure`, both (ny, nx)."""
 
     def filter_and_work(self, pressure: Array) -> float:
         """Compute the modes of the displacement by one transform; return the work from them (Parseval)."""
@@ -88,10 +88,10 @@ class PeriodicOperator(Operator):
         super().__init__(is_small=shape[0] * shape[1] <= SMALL)
         self.multiplier = WavenumberMultiplier(shape, spacing, self.memory)
 
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:
+    def apply(self, pressure: Array) -> Array:
         """Return the displacement under `pressure`, without its mean."""
         self.transforms += 1
-        return self.multiplier.apply(pressure, out)
+        return self.multiplier.apply(pressure)
 
     def filter_and_work(self, pressure: Array) -> float:
         """Compute the modes of the displacement, and the work from them."""
@@ -121,15 +121,15 @@ class HalfSpaceOperator(Operator):
         other.modes, other.planes, other.transforms = None, None, 0.0
         return other
 
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the displacement under `pressure`; only that of a small body is written into `out`."""
+    def apply(self, pressure: Array) -> Array:
+        """Return the displacement under `pressure`."""
         self.transforms += 1
         if self.is_small:
-            return self.apply_at_once(pressure, out)
+            return self.apply_at_once(pressure)
         self.filter_modes(pressure, NO_WORK)
         return self.from_modes()
 
-    def apply_at_once(self, pressure: Array, out: Array | None) -> Array:
+    def apply_at_once(self, pressure: Array) -> Array:
         """Return the displacement, from transforms of the whole padded plane: a call each."""
         from fractalcontact.contact._kernels import multiply_modes
 
@@ -139,11 +139,7 @@ class HalfSpaceOperator(Operator):
         loaded[:ny, :nx] = pressure
         modes = self.transform.forward(loaded, self.memory.array(self.padded, pressure.dtype))
         in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, NO_WORK)
-        displacement = self.transform.backward(modes, moved)[:ny, :nx]
-        if out is None:
-            return displacement.copy()
-        out[...] = displacement
-        return out
+        return self.transform.backward(modes, moved)[:ny, :nx].copy()
 
     def filter_and_work(self, pressure: Array) -> float:
         """Compute the modes of the displacement, and the work from them."""
@@ -177,8 +173,7 @@ class PairSum(Operator):
         self.all_nodes = np.arange(iy.size)
         super().__init__(is_small=True)
 
-    # `out` is of no use: these arrays are small
-    def apply(self, pressure: Array, out: Array | None = None) -> Array:  # noqa: ARG002
+    def apply(self, pressure: Array) -> Array:
         """Return the sum over all nodes of table[offset] times the pressure, for every node."""
         return self.sum_at(pressure, self.all_nodes)
 
