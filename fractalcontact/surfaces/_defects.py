@@ -284,7 +284,7 @@ def _rims(values: Array, gaps: Array, periodic: Sequence[bool]) -> tuple[Array, 
     )
 
 
-Stencil = tuple[tuple[tuple[int, ...], ...], tuple[float, ...]]  # offsets and weights of a difference
+Stencil = tuple[Array, tuple[float, ...]]  # offsets (points, axes) and weights of a difference
 
 
 def _least_energy(
@@ -310,53 +310,32 @@ def _least_energy(
 
 def _difference_matrix(unknown: Array, differences: Sequence[Stencil], periodic: Sequence[bool]) -> Any:
     """Return the differences that involve an unknown point, one in each row of a sparse matrix."""
-    from scipy.sparse import coo_array
+    from scipy.sparse import coo_array, vstack
 
-    index = np.arange(unknown.size).reshape(unknown.shape)
-    row_parts, column_parts, weight_parts, count = [], [], [], 0
+    axes, blocks = tuple(range(unknown.ndim)), []
     for offsets, weights in differences:
-        points = [_offset_index(index, offset, offsets, periodic) for offset in offsets]
-        points = [part.ravel() for part in points]
-        involved = np.any([unknown.ravel()[part] for part in points], axis=0)
-        number = int(np.count_nonzero(involved))
-        for part, weight in zip(points, weights, strict=True):
-            row_parts.append(count + np.arange(number))
-            column_parts.append(part[involved])
-            weight_parts.append(np.full(number, weight))
-        count += number
-    entries = (np.concatenate(weight_parts), (np.concatenate(row_parts), np.concatenate(column_parts)))
-    return coo_array(entries, shape=(count, unknown.size)).tocsr()
+        involved = np.any([np.roll(unknown, -offset, axes) for offset in offsets], axis=0)
+        for axis, (wraps, reach) in enumerate(zip(periodic, offsets.max(axis=0), strict=True)):
+            if not wraps and reach:
+                np.moveaxis(involved, axis, 0)[-reach:] = False
+        places = np.moveaxis(np.argwhere(involved)[:, None] + offsets, -1, 0)
+        columns = np.ravel_multi_index(tuple(places), unknown.shape, mode="wrap")
+        rows = np.repeat(np.arange(len(columns)), len(offsets))
+        entries = np.tile(weights, len(columns)), (rows, columns.ravel())
+        blocks.append(coo_array(entries, shape=(len(columns), unknown.size)))
+    return vstack(blocks).tocsr()
 
 
 def _first_differences(steps: Sequence[float]) -> Iterator[Stencil]:
     """Yield the slope along each axis: their squares are the energy of a membrane."""
-    for axis, step in enumerate(steps):
-        yield tuple(_along(axis, k, len(steps)) for k in range(2)), (-1.0 / step, 1.0 / step)
+    for axis, step in zip(np.eye(len(steps), dtype=int), steps, strict=True):
+        yield np.outer(range(2), axis), (-1.0 / step, 1.0 / step)
 
 
 def _second_differences(steps: Sequence[float]) -> Iterator[Stencil]:
     """Yield the second differences: their squares are the energy of a plate, the mixed one counted twice."""
-    for axis, step in enumerate(steps):
-        offsets = tuple(_along(axis, k, len(steps)) for k in range(3))
-        yield offsets, (1.0 / step**2, -2.0 / step**2, 1.0 / step**2)
+    for axis, step in zip(np.eye(len(steps), dtype=int), steps, strict=True):
+        yield np.outer(range(3), axis), (1.0 / step**2, -2.0 / step**2, 1.0 / step**2)
     if len(steps) == 2:
         weight = math.sqrt(2.0) / (steps[0] * steps[1])
-        yield ((0, 0), (0, 1), (1, 0), (1, 1)), (weight, -weight, -weight, weight)
-
-
-def _along(axis: int, offset: int, axes: int) -> tuple[int, ...]:
-    return tuple(offset if own == axis else 0 for own in range(axes))
-
-
-def _offset_index(
-    index: Array, offset: tuple[int, ...], offsets: tuple[tuple[int, ...], ...], periodic: Sequence[bool]
-) -> Array:
-    """Return the indices of the points at this offset from every position where the stencil fits."""
-    for axis, wraps in enumerate(periodic):
-        reach = max(own[axis] for own in offsets)
-        if wraps:
-            index = np.roll(index, -offset[axis], axis=axis)
-        else:
-            stop = index.shape[axis] - reach
-            index = np.take(index, np.arange(offset[axis], offset[axis] + max(stop, 0)), axis=axis)
-    return index
+        yield np.array([(0, 0), (0, 1), (1, 0), (1, 1)]), (weight, -weight, -weight, weight)
