@@ -88,18 +88,6 @@ class Embedding:
     smallest: float
     clipped: float
 
-    def variogram(self) -> tuple[Array, Array]:
-        """Return lags (in diagonals) and the mean square increments implied by the amplitudes.
-
-        Both have shape (ny, nx); an exact embedding gives 2 lag^(2H).
-        """
-        axes = tuple(axis for axis, n in enumerate(self.amplitude.shape) if n > 1)
-        covariance = fft.dct(self.amplitude**2, 1, axes) / np.prod(self.torus)
-        covariance = covariance.T[: self.shape[0], : self.shape[1]]
-        y, x = (np.arange(n) * step for n, step in zip(self.shape, self.step, strict=True))
-        square = y[:, None] ** 2 + x**2
-        return np.sqrt(square), 2.0 * (covariance[0, 0] - covariance) + self.drift**2 * square
-
 
 def embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -> Embedding:
     """Return the embedding of a surface of this shape; ny = 1 makes a profile.

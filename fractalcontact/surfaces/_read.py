@@ -272,18 +272,14 @@ def _archive_content(request: Request) -> FileContent:
 
     One-dimensional arrays called x and y are the coordinates, in the unit of the heights.
     """
-    path, channel, spacing = request.path, request.channel, request.spacing
-    with _files.corrupt_named(path.name):
-        arrays = _files.read_npz(path)
-    names = [name for name, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)]
-    default = names[0] if len(names) == 1 else "height"
-    name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
-    with Problems(WHERE, UnreadableFile) as problems:
-        expected = (
-            f"one of {', '.join(map(repr, names))} in {path.name!r}" if names else "an array of heights"
-        )
-        problems.require(name in names, "channel", expected, name)
-    values = arrays[str(name)]
+    spacing = request.spacing
+    with _files.corrupt_named(request.path.name):
+        arrays = _files.read_npz(request.path)
+    heights = {
+        key: array for key, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)
+    }
+    name = _channel(list(heights), request, "an array of heights")
+    values = heights[name]
     axes = [arrays.get(dim, np.empty(0)) for dim in ("y", "x")]
     axes = [axis.ravel().astype(np.float64) if axis.dtype.kind in "iuf" else np.empty(0) for axis in axes]
     stated, shape = [axis.size for axis in axes], list(values.shape[-2:])
@@ -299,8 +295,18 @@ def _archive_content(request: Request) -> FileContent:
         return _heights_content(values, replace(request, spacing=spacing))
     with Problems(WHERE, UnreadableFile) as problems:
         expected = f"dims (y, x), as of the arrays y and x {tuple(stated)}"
-        problems.require(spacing is not None or stated != shape[::-1], str(name), expected, tuple(shape))
+        problems.require(spacing is not None or stated != shape[::-1], name, expected, tuple(shape))
     return _array_content(values, request)
+
+
+def _channel(names: Sequence[str], request: Request, kind: str) -> str:
+    """Return the name of the only array, of that called `channel` or with its number, or `height`."""
+    channel, default = request.channel, names[0] if len(names) == 1 else "height"
+    name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
+    with Problems(WHERE, UnreadableFile) as problems:
+        expected = f"one of {', '.join(map(repr, names))}" if names else kind
+        problems.require(name in names, "channel", f"{expected} in {request.path.name!r}", name)
+    return str(name)
 
 
 def _array_content(values: Array, request: Request) -> FileContent:
@@ -327,29 +333,23 @@ def _heights_content(values: Array, request: Request) -> FileContent:
 
 def _netcdf_content(request: Request) -> FileContent:
     """Read `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x)."""
-    path, channel, spacing = request.path, request.channel, request.spacing
+    spacing = request.spacing
+    candidates = _height_variables(netcdf.open(request.path))
+    name = _channel(list(candidates), request, "a variable with dims (y, x)")
+    array = candidates[name]
+    stated = array.attrs.get("units")
+    unit = request.units or stated
     with Problems(WHERE, UnreadableFile) as problems:
-        candidates = _height_variables(netcdf.open(path))
-        name = (
-            next(iter(candidates)) if channel is None and len(candidates) == 1 else str(channel or "height")
-        )
-        expected = (
-            f"one of {', '.join(map(repr, candidates))}" if candidates else "a variable with dims (y, x)"
-        )
-        if problems.require(name in candidates, "channel", f"{expected} in {path.name!r}", name):
-            array = candidates[name]
-            stated = array.attrs.get("units")
-            unit = request.units or stated
-            expected = 'a unit of length, or give `units` ("m", "um" ...)'
-            is_unit = isinstance(unit, str) and unit in (*UNITS, *METRES)
-            problems.require(is_unit, f"{name}.units", expected, NONE if stated is None else stated)
-            array = usual_form(WHERE, array.assign_attrs(units=unit))[0].astype(np.float64)
-            array.attrs["units"] = "m"
-            if spacing is not None and check_spacing(problems, len(core_dims(array)), spacing):
-                core = core_dims(array)
-                steps, sizes = axis_spacing(spacing, len(core)), [array.sizes[dim] for dim in core]
-                array = array.assign_coords(plane_coords(sizes, steps, [False] * len(core), core))
-            problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
+        expected = 'a unit of length, or give `units` ("m", "um" ...)'
+        is_unit = isinstance(unit, str) and unit in (*UNITS, *METRES)
+        problems.require(is_unit, f"{name}.units", expected, NONE if stated is None else stated)
+        array = usual_form(WHERE, array.assign_attrs(units=unit))[0].astype(np.float64)
+        array.attrs["units"] = "m"
+        if spacing is not None and check_spacing(problems, len(core_dims(array)), spacing):
+            core = core_dims(array)
+            steps, sizes = axis_spacing(spacing, len(core)), [array.sizes[dim] for dim in core]
+            array = array.assign_coords(plane_coords(sizes, steps, [False] * len(core), core))
+        problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = stated if stated is None else str(stated)
     array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
     return FileContent(array, {"stated_unit": stated, "before": provenance_of(candidates[name]) or None})

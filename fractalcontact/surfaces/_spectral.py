@@ -161,12 +161,11 @@ def spectral(
     unit = power_of_two(max(steps))
     cutoffs = {"long_cutoff": long_cutoff, "rolloff": rolloff, "short_cutoff": short_cutoff}
     band = _Band.of(shape, spacing, hurst, cutoffs, anisotropy_ratio, direction)
-    ny, nx = (1, *sizes)[-2:]
-    dy, dx = ((1.0, *steps)[-2] / unit, steps[-1] / unit)
+    plane, scaled = _plane(shape, spacing)
 
     def draw_heights(stream: np.random.Generator) -> tuple[Array, dict[str, Any]]:
-        modes, energy = _filtered_modes((ny, nx), (dy, dx), band, stream, slope=of_slope, expected=expected)
-        heights = fft.irfft2(modes, (ny, nx), overwrite=True)
+        modes, energy = _filtered_modes(plane, scaled, band, stream, slope=of_slope, expected=expected)
+        heights = fft.irfft2(modes, plane, overwrite=True)
         mean_square = _multiply(heights, float(rms) / math.sqrt(energy) * (unit if of_slope else 1.0))
         error = _achieved_error(math.sqrt(mean_square / energy), target, expected)
         return heights.reshape(sizes), {"achieved_error": error}
@@ -189,16 +188,17 @@ def _wavelengths(
     return longest, corner, shortest
 
 
-def _check_modes(problems: Problems, band: _Band, shape: Any, spacing: Any) -> None:
-    """Check that some mode of the grid lies inside the band."""
+def _plane(shape: Any, spacing: Any) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Return the shape (ny, nx), ny = 1 of a profile, and the spacing over the power of two above it."""
     sizes, steps = _from_array.sizes_and_steps(shape, spacing)
     unit = power_of_two(max(steps))
-    waves = [
-        2.0 * math.pi / (n * step / unit) * np.arange(n // 2 + 1)
-        for n, step in zip(sizes, steps, strict=True)
-    ]
-    waves_y = waves[0][:, None] if len(sizes) == 2 else np.zeros((1, 1))
-    has_modes = any(band.amplitude(row, waves[-1]).any() for row in waves_y)
+    return ((1, *sizes)[-2], sizes[-1]), ((1.0, *steps)[-2] / unit, steps[-1] / unit)
+
+
+def _check_modes(problems: Problems, band: _Band, shape: Any, spacing: Any) -> None:
+    """Check that some mode of the grid lies inside the band."""
+    waves_y, waves_x = half_wavenumbers(*_plane(shape, spacing))
+    has_modes = any(band.amplitude(row, waves_x).any() for row in waves_y[:, None])
     expected = "at least one mode of the grid between them"
     problems.require(has_modes, "long_cutoff / short_cutoff", expected, NONE)
 
