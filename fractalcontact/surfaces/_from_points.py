@@ -137,10 +137,9 @@ def from_points(
         gridded = _triangulated(values, step, given, largest_gap, cells)
     facts = {"points": len(values), "missing_points": int(np.isnan(gridded.heights).sum()), **frame}
     core = ("y", "x")[2 - gridded.heights.ndim :]
-    centres = dict(zip(core, gridded.centres, strict=True))
-    if cells is not None and isinstance(plane, xr.DataArray):
-        centres = {dim: np.asarray(plane[dim].values) for dim in core}  # the same to the last bit
-    surface = xr.DataArray(gridded.heights, centres, core, name="height")
+    surface = xr.DataArray(
+        gridded.heights, dict(zip(core, gridded.centres, strict=True)), core, name="height"
+    )
     if gridded.finest is not None:
         surface = surface.assign_coords(finest_scale=gridded.finest)
     parameters: dict[str, Any] = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
@@ -176,12 +175,9 @@ def _cells_of(plane: Any) -> tuple[_Axis, ...] | None:
     """Return the cells (y, x) of a surface whose plane is used; None for any other plane."""
     if not isinstance(plane, xr.DataArray) or not set(plane.dims) <= {"y", "x"}:
         return None
-    axes = []
-    for dim in plane.dims:
-        centres = np.asarray(plane[dim].values, dtype=np.float64)
-        axes.append(_Axis(float(centres[0]), float(np.ptp(centres)) / (centres.size - 1), centres.size))
+    axes = tuple(_Axis(np.asarray(plane[dim].values, dtype=np.float64)) for dim in plane.dims)
     is_square = np.ptp([axis.spacing for axis in axes]) <= 1e-6 * axes[0].spacing  # but for rounding
-    return tuple(axes) if is_square else None
+    return axes if is_square else None
 
 
 def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | None) -> Gridded | None:
@@ -196,10 +192,10 @@ def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | No
         for axis, column in zip(cells, columns, strict=True):
             if not axis.has_nodes_at(points[:, column]):
                 return None
-            number = np.rint((points[:, column] - axis.first) / axis.spacing)
-            inside &= (number >= 0) & (number < axis.count)
+            number = axis.index(points[:, column])
+            inside &= (number >= 0) & (number < axis.centres.size)
         axes, points = cells, points[inside]
-    shape = tuple(axis.count for axis in axes)
+    shape = tuple(axis.centres.size for axis in axes)
     index = np.ravel_multi_index(
         tuple(axis.index(points[:, column]) for axis, column in zip(axes, columns, strict=True)), shape
     )
@@ -208,26 +204,23 @@ def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | No
     total = np.bincount(index, weights=points[:, -1], minlength=math.prod(shape))
     with np.errstate(invalid="ignore"):
         heights = (total / np.where(count > 0, count, np.nan)).reshape(shape)
-    repeated = int(np.count_nonzero(count > 1))
-    facts = {"repeated_nodes": repeated}
+    facts = {"repeated_nodes": int(np.count_nonzero(count > 1))}
     centres = tuple(axis.centres for axis in axes)
     return Gridded(heights, centres, None, "none: the points are on a grid", facts)
 
 
 @dataclass(frozen=True)
 class _Axis:
-    """A uniform axis: first centre, spacing, number of centres."""
+    """A uniform axis: the centres of its cells."""
 
-    first: float
-    spacing: float
-    count: int
+    centres: Array
 
     @property
-    def centres(self) -> Array:
-        return self.first + self.spacing * np.arange(self.count)
+    def spacing(self) -> float:
+        return float(np.ptp(self.centres)) / (self.centres.size - 1)
 
     def index(self, positions: Array) -> Array:
-        return np.rint((positions - self.first) / self.spacing).astype(np.int64)
+        return np.asarray(np.rint((positions - self.centres[0]) / self.spacing), np.int64)
 
     def has_nodes_at(self, positions: Array, off: float = 0.05) -> bool:
         """Return whether no position is further from a node than a share of the spacing.
@@ -235,7 +228,7 @@ class _Axis:
         Of 344 drawn axes, exact, with noise, with gaps, and random, .02 finds 14 others and .1 9 others; no
         random one is found.
         """
-        place = (positions - self.first) / self.spacing
+        place = (positions - self.centres[0]) / self.spacing
         return float(np.abs(place - np.rint(place)).max()) <= off
 
 
@@ -246,7 +239,7 @@ def _regular_axes(points: Array, spacing: float | None) -> tuple[_Axis, ...] | N
     axes = tuple(axis for axis in found if axis is not None)
     if len(axes) < len(columns):
         return None
-    if math.prod(axis.count for axis in axes) > 2 * len(points):  # too few to leave gaps between them
+    if math.prod(axis.centres.size for axis in axes) > 2 * len(points):  # too few to leave gaps between them
         return None
     # a spacing may be stated with three digits
     matches = spacing is None or all(abs(axis.spacing - spacing) <= 1e-3 * spacing for axis in axes)
@@ -272,7 +265,7 @@ def _regular_axis(positions: Array, most: int) -> _Axis | None:
         if not 2 <= count <= 2 * most:
             continue
         # the mean step over the extent is more accurate than that of rounded positions
-        axis = _Axis(float(ordered[0]), extent / (count - 1), count)
+        axis = _Axis(ordered[0] + extent / (count - 1) * np.arange(count))
         if axis.has_nodes_at(ordered):
             return axis
     return None
@@ -287,15 +280,12 @@ def _profile(
     if x.size < 3:
         raise InvalidInput(WHERE, ["points: expected at least 3 positions along the profile"])
     distances = np.diff(x)
-    longest = _default_gap(distances, distances) if largest_gap is None else float(largest_gap)
-    bridged = distances <= longest
-    if not bridged.any():
-        raise InvalidInput(WHERE, [_gap_problem(longest, float(distances.min()))])
+    longest, bridged = _bridged(distances, distances, largest_gap)
     near = distances[bridged]
     # of a uniform profile the distance itself; long distances count by their length
     distance = float(np.sqrt(np.average(near**2, weights=near)))
     step = _step(spacing, float(near.mean()), distance)
-    centres = _centres(x[[0]], x[[-1]], step)[0] if cells is None else cells[0].centres
+    (centres,) = _centres(x[[0]], x[[-1]], step, cells)
     heights = np.interp(centres, x, z, left=np.nan, right=np.nan)
     left = np.clip(np.searchsorted(x, centres, side="right") - 1, 0, x.size - 2)
     heights[~bridged[left]] = np.nan
@@ -329,21 +319,16 @@ def _triangulated(
     areas = np.abs(doubled)
     if not areas.sum() > 0:
         raise InvalidInput(WHERE, ["points: expected points that span an area in the plane"])
-    gap = math.inf if given is not None else _default_gap(longest, areas)
-    gap = gap if largest_gap is None else float(largest_gap)
-    kept = (longest <= gap) & (areas > 0)
-    if not kept.any():
-        raise InvalidInput(WHERE, [_gap_problem(gap, float(longest.min()))])
+    if given is not None and largest_gap is None:
+        largest_gap = math.inf
+    gap, kept = _bridged(longest, areas, largest_gap)
     # of a square grid the distance itself: its triangles have longest edges of sqrt(2) distances
     distance = math.sqrt(0.5 * float(np.average(longest[kept] ** 2, weights=areas[kept])))
     # there are twice as many triangles as points, but for those at the border; the areas are doubled
     mean_distance = math.sqrt(float(areas[kept].sum()) / np.count_nonzero(kept))
     # between the corners of a triangle of a mesh any number of cells may be asked for
     step = _step(spacing, mean_distance, distance if given is None else 0.0)
-    if cells is None:
-        y, x = _centres(points[:, 1::-1].min(axis=0), points[:, 1::-1].max(axis=0), step)
-    else:
-        y, x = (axis.centres for axis in cells)
+    y, x = _centres(points[:, 1::-1].min(axis=0), points[:, 1::-1].max(axis=0), step, cells)
     heights = np.full((y.size, x.size), np.nan)
     flat, z, faces = (np.ascontiguousarray(array) for array in (flat, points[:, 2], triangles[kept]))
     _fill_triangles(flat, z, faces, y - origin[1], x - origin[0], heights)
@@ -369,15 +354,23 @@ def _delaunay(flat: Array) -> Array:
     return np.asarray(triangulation.simplices, dtype=np.int64)
 
 
-def _default_gap(lengths: Array, weights: Array, factor: float = 3.0) -> float:
-    """Return a multiple of the length up to which half of the weight is.
+def _bridged(
+    lengths: Array, weights: Array, largest_gap: float | None, factor: float = 3.0
+) -> tuple[float, Array]:
+    """Return the longest length that is bridged, and which of those with a weight are.
 
-    Of random points a factor of 2 loses .0015 of the cells, 2.5 and more none, and 4 closes a hole of 6 point
-    distances.
+    By default it is a multiple of the length up to which half of the weight is. Of random points a factor of
+    2 loses .0015 of the cells, 2.5 and more none, and 4 closes a hole of 6 point distances.
     """
-    order = np.argsort(lengths)
-    share = np.cumsum(weights[order])
-    return factor * float(lengths[order][np.searchsorted(share, 0.5 * share[-1])])
+    if largest_gap is None:
+        order = np.argsort(lengths)
+        share = np.cumsum(weights[order])
+        largest_gap = factor * lengths[order][np.searchsorted(share, 0.5 * share[-1])]
+    bridged = (lengths <= largest_gap) & (weights > 0)
+    if not bridged.any():
+        expected = f"more than the smallest distance of points, {lengths.min():.3g} m"
+        raise InvalidInput(WHERE, [f"largest_gap: expected {expected}, got {largest_gap:g}"])
+    return float(largest_gap), bridged
 
 
 def _finest(distance: float, step: float) -> float:
@@ -387,12 +380,6 @@ def _finest(distance: float, step: float) -> float:
     of a coarse grid, up to 4 spacings, hold parts of still shorter ones.
     """
     return max(8.0 * distance, 4.0 * step)
-
-
-def _gap_problem(largest: float, smallest: float) -> str:
-    return (
-        f"largest_gap: expected more than the smallest distance of points, {smallest:.3g} m, got {largest:g}"
-    )
 
 
 def _step(spacing: float | None, mean_distance: float, distance: float) -> float:
@@ -406,8 +393,10 @@ def _step(spacing: float | None, mean_distance: float, distance: float) -> float
     return float(spacing)
 
 
-def _centres(low: Array, high: Array, step: float) -> tuple[Array, ...]:
-    """Return the centres of cells between the outermost points, at (k + 1/2) steps."""
+def _centres(low: Array, high: Array, step: float, cells: tuple[_Axis, ...] | None) -> tuple[Array, ...]:
+    """Return the centres of given cells, or of those between the outermost points, at (k + 1/2) steps."""
+    if cells is not None:
+        return tuple(axis.centres for axis in cells)
     first = np.ceil(low / step - 0.5)
     counts = np.floor(high / step - 0.5) - first + 1
     problem = ""
