@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
-from fractalcontact.base.jit import inner_kernel, kernel, sum_kernel
+from fractalcontact.base.jit import inner_kernel, sum_kernel
 from fractalcontact.base.regression import student_quantile
 from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import ARRAYS, public_result
@@ -178,11 +178,9 @@ def _lacunarity_from_pairs(cells: Array, sizes: Array) -> Array:
         return np.full(sizes.size, np.nan)
     modes = fft.rfft2(cells.astype(np.float64))
     power = (modes.real**2 + modes.imag**2).astype(np.complex128)
-    pairs = np.rint(fft.irfft2(power, (ny, nx), overwrite=True))
-    largest = int(sizes.max())
-    bound = ny * nx * largest**4
-    squares = squares_from_pairs(pairs.astype(np.int64 if bound <= LARGEST_INT64 else np.float64), largest)
-    return np.array([ny * nx * squares[size].item() / float(mass * int(size) ** 2) ** 2 for size in sizes])
+    pairs = fft.irfft2(power, (ny, nx), overwrite=True)
+    squares = squares_from_pairs(np.rint(pairs, out=pairs), int(sizes.max()))
+    return np.array([ny * nx * squares[s - 1] / float(mass * s**2) ** 2 for s in sizes.tolist()])
 
 
 def _fixed_lacunarity(planes: Planes, cells: Array, sizes: Array) -> Array:
@@ -220,34 +218,22 @@ def _notes(planes: Planes, values: Array, boxes: str) -> dict[str, dict[str, str
     return notes
 
 
-@kernel
-def squares_from_pairs(pairs: Array, largest: int) -> Array:
-    """Sum of squared masses for every size up to `largest` (index 0 is unused), both axes periodic.
+def squares_from_pairs(pairs: Array, largest: int) -> list[Any]:
+    """Return the sum of squared masses for every size from 1 to `largest`, both axes periodic.
 
     `pairs[u, v]` is the number of pairs of set cells u rows and v columns apart, on the torus. The sum of
     squares is that of (s - |u|)(s - |v|) pairs[u, v] over |u|, |v| < s, so a double sum of double sums.
     """
-    ny, nx = pairs.shape
-    total = np.zeros(largest + 1, pairs.dtype)
-    column = np.zeros(largest, pairs.dtype)  # over |u| <= a, at v = +-b
-    within = np.zeros(largest, pairs.dtype)  # over |v| <= b too, and summed over a
-    for a in range(largest):
-        back = (ny - a) % ny
-        running = pairs.dtype.type(0)
-        for b in range(largest):
-            value = pairs[a % ny, b % nx]
-            if b > 0:
-                value += pairs[a % ny, nx - b]
-            if a > 0:
-                value += pairs[back, b % nx]
-            if a > 0 and b > 0:
-                value += pairs[back, nx - b]
-            column[b] += value
-            running += column[b]
-            within[b] += running
-        for b in range(a + 1):
-            total[a + 1] += within[b]
-    return total
+    size = pairs.size
+    for axis in (0, 1):  # both signs of each distance
+        lines = np.moveaxis(pairs, axis, 0)
+        both = lines[:largest].copy()
+        both[1:] += lines[:-largest:-1]
+        pairs = np.moveaxis(both, 0, axis)
+    sums = pairs.astype(np.int64 if size * largest**4 <= LARGEST_INT64 else np.float64)
+    for axis in (0, 0, 1, 1):
+        np.cumsum(sums, axis, out=sums)
+    return list(sums.diagonal().tolist())
 
 
 def box_moments(planes: Planes, boxes: Array, masses: Array | None = None) -> tuple[Array, Array]:
