@@ -235,13 +235,7 @@ class WindowFit:
         return self.slope_high - self.slope_low <= 0.15
 
 
-def _unsaturated_counts(
-    planes: Planes,
-    sizes: Array,
-    curve: Curve,
-    *,
-    saturated: float = 0.5,  # share of the boxes; .3 has 4 % more error, .7 the same
-) -> Array:
+def _unsaturated_counts(planes: Planes, sizes: Array, curve: Curve) -> Array:
     """Return for each plane how many of the sizes, from the smallest, leave half of the boxes or more empty.
 
     Beyond that any set of islands has boxes of slope 2, which scatter least of all. A set of which one island
@@ -251,7 +245,7 @@ def _unsaturated_counts(
     length = sizes.astype(float) if planes.rank == 1 else np.ones(sizes.size)
     share = curve.area / (np.maximum(planes.observed, 1)[:, None] * length)
     largest = np.array([plane.sizes.max(initial=0) for plane in label_planes(planes, 2, keep=False)])
-    count = np.logical_and.accumulate(share < saturated, axis=-1).sum(-1)
+    count = np.logical_and.accumulate(share < 0.5, axis=-1).sum(-1)  # .3 has 4 % more error, .7 the same
     return np.asarray(np.where(2 * largest > planes.occupied, sizes.size, count))
 
 
@@ -264,11 +258,11 @@ def _fit(
     *,
     by_regression: bool,
     one_for_all: bool,
-    # of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the
-    # intervals hold (width .279), with half of it .985 (.301)
-    between_clusters: float = 0.06,
 ) -> list[WindowFit]:
     """Return the dimension, its interval and its window of sizes for every plane."""
+    # of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the
+    # intervals hold (width .279), with half of it .985 (.301)
+    between_clusters = 0.06
     if by_regression:
         regressions = [_scaling_fit.fit_regression(sizes, measure) for measure in curve.measure]
         pairs = [(fit.dimension, 2.0 * fit.spread) for fit in regressions]
@@ -316,22 +310,16 @@ def _longest_edge(cells: Array) -> int:
     return max((int(places[-1] - places[0]) + 1 if places.size else 0) for places in extents)
 
 
-def fit_two_covers(
-    sizes: Array,
-    fewest: Array,
-    mean: Array,
-    cover: str,
-    *,
-    limit: float = 0.02,  # with 0 .985 hold (width .286), with .05 all (.365), without one the width is .610
-) -> tuple[float, float]:
+def fit_two_covers(sizes: Array, fewest: Array, mean: Array, cover: str) -> tuple[float, float]:
     """Return the dimension and the half-width of its interval, from the areas of both covers.
 
     The fewest boxes are exact for sets on a lattice; for curves that lie across it their count rises too fast
     towards small sizes. The mean number errs the other way, and less. Where the mean varies less, both have
     the same weight; elsewhere the fewest boxes are weighted by their variance. Slopes that vary little may
-    still share an error: the difference of the two covers widens the interval, up to a `limit`, as the mean
+    still share an error: the difference of the two covers widens the interval, up to a limit, as the mean
     is far off for sets on a lattice.
     """
+    limit = 0.02  # with 0 .985 hold (width .286), with .05 all (.365), without one the width is .610
     first, second = _scaling_fit.fit_steady_ratio(sizes, fewest), _scaling_fit.fit_steady_ratio(sizes, mean)
     if not (np.isfinite(first.dimension) and np.isfinite(second.dimension)):
         return first.dimension if cover == "minimum" else second.dimension, np.nan
@@ -346,20 +334,13 @@ def fit_two_covers(
 
 
 def _null(
-    planes: Planes,
-    sizes: Array,
-    windows: list[slice],
-    cover: str,
-    *,
-    by_regression: bool,
-    tested: Sequence[int] = (2, 3, 4),
+    planes: Planes, sizes: Array, windows: list[slice], cover: str, *, by_regression: bool
 ) -> dict[str, Array]:
     """Return counts, dimension and spread of the random null, and whether the set differs from it.
 
-    The null is fitted in the window of its plane, and compared at the sizes `tested`.
+    The null is fitted in the window of its plane, and compared at sizes of 2, 3 and 4 cells.
     """
-    shorter = min(planes.sides)
-    small = np.array([size for size in tested if 2 * size <= shorter], np.int64)
+    small = np.array([size for size in (2, 3, 4) if 2 * size <= min(planes.sides)], np.int64)
     mean = cover_curve(planes, small, "mean").measure if small.size else np.zeros((planes.count, 0))
     largest = (2.0 * max(1, *sizes, *small)) ** planes.rank  # cells of two corners, or more than two boxes
     counts, rows = [], []

@@ -73,14 +73,7 @@ def _minimum_cover(planes: Planes, sizes: Array) -> Curve:
 
 
 def _fewest_boxes(
-    cells: Array,
-    size: int,
-    row_bands: Array,
-    column_bands: Array,
-    *,
-    wrap_x: bool,
-    folded: int = 1 << 13,  # positions of boxes that are kept apart: with fewer, loops are too short
-    added: int = 1 << 22,  # sums that are added up at a time: all those of a large plane take gigabytes
+    cells: Array, size: int, row_bands: Array, column_bands: Array, *, wrap_x: bool
 ) -> tuple[int, int]:
     """Return the fewest boxes that meet the set, and their least area in cells, over all offsets of the grid.
 
@@ -93,13 +86,16 @@ def _fewest_boxes(
     count, area = np.zeros((offsets, size), np.int32), np.zeros((offsets, size), np.int64)
     beyond = 2 * size if wrap_x else 0
     positions = int(is_full.sum())
+    folded = 1 << 13  # positions of boxes that are kept apart: with fewer, loops are too short
     fold = size * max(1, -(-min(positions, folded) // size))  # of a whole number of boxes
     met, lost = np.zeros((2, offsets, fold), np.int32)
     count_boxes_in_bands(
         cells, size, row_bands, column_bands[~is_full], positions, beyond, met, lost, count, area
     )
     fewest, least = [], []
-    step = max(1, added // fold)
+    step = max(
+        1, (1 << 22) // fold
+    )  # sums that are added up at a time: those of a large plane take gigabytes
     for start in range(0, offsets, step):
         rows = slice(start, start + step)
         full, cut = (v[rows].reshape(-1, fold // size, size).sum(1, dtype=np.int64) for v in (met, lost))

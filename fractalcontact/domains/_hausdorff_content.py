@@ -293,11 +293,7 @@ def _contact_fractions(planes: Planes) -> tuple[Array, Array]:
     return planes.occupied / cells, (planes.occupied - EXCESS_PER_EDGE * sides) / cells
 
 
-def stationary_exponents(
-    stacks: Sequence[Planes],
-    *,
-    shifts: int = 4,  # of the grid of squares: exponents are within .008 of those of 16, with one within .020
-) -> Array:
+def stationary_exponents(stacks: Sequence[Planes]) -> Array:
     """Return for each plane the largest exponent up to which its content does not fall with the resolution.
 
     `stacks` are the same domains on finer to coarser grids. At the exponent 2 the content is the area.
@@ -308,6 +304,7 @@ def stationary_exponents(
     if not are_square or np.abs(doublings - np.rint(doublings)).max() > SQUARE:
         return np.full(stacks[0].count, np.nan)
     levels = int(np.ceil(np.log2(max(stacks[0].grid.shape))))
+    shifts = 4  # of the grid of squares: exponents are within .008 of those of 16, with one within .020
     contents = [
         shifted_contents(planes, EXPONENTS, levels - int(doubling), shifts).mean(1) * planes.side**EXPONENTS
         for planes, doubling in zip(stacks, np.rint(doublings), strict=True)

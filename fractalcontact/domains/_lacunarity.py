@@ -141,15 +141,9 @@ def analyse(
     return planes.dataset(variables, planes.box_coords(sizes), notes=_notes(planes, values, boxes))
 
 
-def _with_interval(
-    planes: Planes,
-    cells: Array,
-    sizes: Array,
-    boxes: str,
-    *,
-    many: int = 24,  # above so many sizes one transform is cheaper than a sum for each
-) -> tuple[Array, Array, Array]:
+def _with_interval(planes: Planes, cells: Array, sizes: Array, boxes: str) -> tuple[Array, Array, Array]:
     """Return <M^2> / <M>^2 and the ends of its interval, each (planes, sizes); NaN where undefined."""
+    many = 24  # above so many sizes one transform is cheaper than a sum for each
     all_positions = planes.valid is None and all(planes.grid.periodic) and cells.dtype == np.uint8
     if boxes == "fixed":
         values = _fixed_lacunarity(planes, cells, sizes)

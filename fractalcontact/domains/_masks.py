@@ -348,19 +348,14 @@ def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
     return coords
 
 
-def parallel_map(
-    function: Callable[[S], R],
-    items: Iterable[S],
-    cells: int,
-    *,
-    cells_per_thread: int = 1 << 18,  # a pass over so many takes as long as to start a pool of threads
-) -> list[R]:
+def parallel_map(function: Callable[[S], R], items: Iterable[S], cells: int) -> list[R]:
     """Apply a function that releases the interpreter lock to all items, in order.
 
     Each item takes a pass over so many cells. On several threads where that is worth their start, some items
     at a time: to hand over one takes as long as a pass over a thousand cells.
     """
     items = list(items)
+    cells_per_thread = 1 << 18  # a pass over so many takes as long as to start a pool of threads
     threads = min(thread_count(), len(items), len(items) * cells // cells_per_thread)
     if threads < 2:
         return [function(item) for item in items]

@@ -124,20 +124,11 @@ class PairsInGaps:
     edges (once 1.6), and .94 to 1.35 on aligned grids.
     """
 
-    def __init__(
-        self,
-        valid: Array,
-        rank: int,
-        longest: int,
-        *,
-        most_offsets: int = 9,
-        most_numbers: int = 40,
-        of_each: int = 8,
-        most_places: int = 1 << 16,  # of larger planes so many are drawn, always the same
-    ) -> None:
+    most_offsets, most_numbers, of_each = 9, 40, 8
+    most_places = 1 << 16  # of larger planes so many are drawn, always the same
+
+    def __init__(self, valid: Array, rank: int, longest: int) -> None:
         self.shape, self.rank = valid.shape, rank
-        self.most_offsets, self.most_numbers, self.of_each = most_offsets, most_numbers, of_each
-        self.most_places = most_places
         continued = np.pad(valid, [(0, edge) for edge in self._box(longest)], mode="wrap")
         self._sums = np.pad(continued.astype(np.int32).cumsum(0).cumsum(1), ((1, 0), (1, 0)))
         self._chosen = cache(self._choose)
@@ -232,18 +223,13 @@ def dimension_deviation(
     return float(np.linalg.norm(differences))
 
 
-def differs_from_null(
-    mean_counts: Array,
-    null: Array,
-    covariance: Array,
-    *,
-    deviations: float = 3.3,  # about one null in a thousand lies further out at a given size
-) -> bool:
+def differs_from_null(mean_counts: Array, null: Array, covariance: Array) -> bool:
     """Return whether the mean counts of boxes of a few cells lie outside the range of the null.
 
-    A departure must exceed so many standard deviations and one box: where hardly two cells of the null are
+    A departure must exceed some standard deviations and one box: where hardly two cells of the null are
     neighbours, one pair of neighbours is not significant.
     """
+    deviations = 3.3  # about one null in a thousand lies further out at a given size
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     return bool(np.any(np.abs(mean_counts - null) > deviations * deviation + 1.0))
 
@@ -279,13 +265,7 @@ class NullBoxes:
         """Return the boxes of each size that meet the null."""
         return null.expected_counts([self.contents[size] for size in sizes.tolist()])
 
-    def covariance(
-        self,
-        null: RandomCells,
-        sizes: Array,
-        *,
-        never_empty: float = -60.0,  # ln q: 10^6 boxes have a standard deviation of 10^-7 at most
-    ) -> Array:
+    def covariance(self, null: RandomCells, sizes: Array) -> Array:
         """Return the covariance of the counts at all pairs of ascending sizes.
 
         Exact without gaps on a periodic plane and on aligned grids. At free edges, where boxes at any place
@@ -295,7 +275,7 @@ class NullBoxes:
         """
         contents = [self.contents[size] for size in sizes.tolist()]
         areas = np.array([np.prod(np.minimum(size, self.sides)) for size in sizes], np.int64)
-        scatters = null.log_miss(areas) > never_empty
+        scatters = null.log_miss(areas) > -60.0  # else 10^6 boxes have a standard deviation of 10^-7 at most
         sums = [of.boxes * float(of.share @ (of.cells * null.miss(of.cells))) for of in contents]
         covariance = np.zeros((sizes.size, sizes.size))
         for i, first in enumerate(sizes.tolist()):
@@ -336,15 +316,9 @@ def _contents_in_gaps(
     return contents
 
 
-def _full_contents(
-    planes: Planes,
-    size: int,
-    longest: int,
-    cover: str,
-    *,
-    most: int = 64,  # cuts that stand for all: counts of boxes of 65 to 250 cells change by up to 4e-4
-) -> BoxContents:
+def _full_contents(planes: Planes, size: int, longest: int, cover: str) -> BoxContents:
     """Return the contents of boxes where all was observed; those longer than `longest` count as full."""
+    most = 64  # cuts that stand for all: counts of boxes of 65 to 250 cells change by up to 4e-4
     if cover == "aligned":
         places = [np.arange(0, n, size) for n in planes.sides]
         cells = [np.minimum(size, n - start) for n, start in zip(planes.sides, places, strict=True)]

@@ -191,22 +191,15 @@ def analyse(
     return planes.dataset(variables, coords, notes=_notes(low, high))
 
 
-def common_window(
-    spots: Array,
-    gaps: Array,
-    shortest: float,
-    extent: float,
-    *,
-    least_ratio: float = 4.0,  # between five surfaces D scattered by .041 at a ratio of 2, .031 at 4
-    usual_share: int = 8,  # beyond L/8 the block jackknife covers half of the true spread
-    last_share: int = 4,  # 2 and 8 gave the same windows of 40 states of pressed surfaces
-) -> tuple[float, float]:
+def common_window(spots: Array, gaps: Array, shortest: float, extent: float) -> tuple[float, float]:
     """Return the window (m) of states with these spots and gaps; where it does not fit, (nan, nan).
 
-    It ends at the `usual_share` of the extent, but where spots are large one of the `least_ratio` may reach
-    up to the `last_share`. A state with a gap below twice its own start is filled whatever the window is, and
-    has no say in it.
+    It ends at an eighth of the extent, but where spots are large one of ratio 4 may reach up to a quarter. A
+    state with a gap below twice its own start is filled whatever the window is, and has no say in it.
     """
+    least_ratio = 4.0  # between five surfaces D scattered by .041 at a ratio of 2, .031 at 4
+    usual_share = 8  # beyond L/8 the block jackknife covers half of the true spread
+    last_share = 4  # 2 and 8 gave the same windows of 40 states of pressed surfaces
     own_start = np.maximum(FINEST * shortest, spots)
     open_states = ~(gaps < 2.0 * own_start)  # a gap is NaN beyond half the extent
     low = max(FINEST * shortest, np.max(spots[open_states], initial=0.0))
@@ -266,12 +259,7 @@ class RandomSpots:
 
 
 def _window_quantities(
-    planes: Planes,
-    spots: RandomSpots,
-    window: Array,
-    scales: Array,
-    *,
-    sizes: int = 9,  # in a window of ratio 4 at a ratio of 1.19, so that local slopes still differ
+    planes: Planes, spots: RandomSpots, window: Array, scales: Array
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return dimension, excess, clustering and lacunarity over the window and at its three scales.
 
@@ -279,6 +267,7 @@ def _window_quantities(
     """
     grid = planes.grid
     low, high = window if np.isfinite(window).all() else scales[[0, -1]]
+    sizes = 9  # in a window of ratio 4 at a ratio of 1.19, so that local slopes still differ
     fitted = np.geomspace(low, high, sizes)
     hits, masses = Bracket.of(np.append(fitted, scales), grid, 1), Bracket.of(scales, grid, 0)
     squares = masses.boxes
@@ -344,15 +333,10 @@ class Bracket:
         return np.asarray(np.where(self.weight > 0, below + self.weight * (above - below), below))
 
 
-def _curve_steps(
-    shortest: float,
-    extent: float,
-    grid: Grid,
-    *,
-    sizes: int = 24,  # with 300, 15 gaps at 256 cells moved by .4 % at most
-) -> Array:
+def _curve_steps(shortest: float, extent: float, grid: Grid) -> Array:
     """Return the squares of the curves, from a cell to half the extent, in cells along y and x."""
-    sides = np.geomspace(shortest, max(extent / 2.0, shortest), sizes)
+    # with 300 in place of 24, 15 gaps at 256 cells moved by .4 % at most
+    sides = np.geomspace(shortest, max(extent / 2.0, shortest), 24)
     cells = np.rint(sides[:, None] / np.array(grid.spacing)).astype(np.int64)
     return np.unique(np.clip(cells, 1, np.maximum(np.array(grid.shape) - 1, 1)), axis=0)
 
@@ -384,16 +368,10 @@ def _gap(lengths: Array, hit: Array) -> Array:
 
 
 def _flags(
-    planes: Planes,
-    gap: Array,
-    islands: Array,
-    median: Array,
-    start: Array,
-    *,
-    has_window: bool,
-    fewest_cells: int = 10,  # below, clustering grows with the grid (2.6 to 9.4, 256 to 2048)
+    planes: Planes, gap: Array, islands: Array, median: Array, start: Array, *, has_window: bool
 ) -> tuple[Array, Array]:
     """Return the flag of each state, out of `FLAGS`, and the reason in words."""
+    fewest_cells = 10  # below, clustering grows with the grid (2.6 to 9.4, 256 to 2048)
     coverage, count = planes.coverage, planes.count
     tests: list[tuple[Array, list[str]]] = [
         (~(coverage > 0), ["the set is empty"] * count),

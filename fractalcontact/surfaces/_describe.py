@@ -156,11 +156,7 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     return result | _gradients(neighbours, slopes, result["rms_height"], scale, unit, by_modes)
 
 
-def _statistics_in_blocks(
-    surface: xr.DataArray,
-    spacing: Sequence[float],
-    slab: int = 1 << 22,  # points at a time: their differences take ten times their 34 MB
-) -> dict[str, float]:
+def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> dict[str, float]:
     """Return the statistics of a plane or a profile of dask, from one row of blocks at a time."""
     axes, ny, nx = surface.ndim, (1, *surface.shape)[-2], surface.shape[-1]
     low, high, origin, total, size, infinite = math.inf, -math.inf, math.nan, 0.0, 0, 0
@@ -183,7 +179,8 @@ def _statistics_in_blocks(
     for block, start in _row_blocks(surface):
         block -= low
         block /= scale
-        for first in range(0, len(block), rows := max(3, slab // nx)):
+        # 2^22 points at a time: their differences take ten times their 34 MB
+        for first in range(0, len(block), rows := max(3, (1 << 22) // nx)):
             values = block[first : first + rows]
             is_known = ~np.isnan(values)
             powers += _powers(values[is_known], mean)

@@ -167,11 +167,9 @@ def _plane_of(points: Array) -> tuple[Array, Array, float]:
     return centre, _rotation_to(normal, axis), math.sqrt(float(np.mean(distances * distances))) * scale
 
 
-def _require_plane(
-    sizes: Array,
-    collinear: float = 1e-7,  # width over length of points on a line: rounding leaves 1.3e-8
-    thickest: float = 0.7,  # thickness over width; of 300 balls of 100 points 1 % have less than .77
-) -> None:
+def _require_plane(sizes: Array) -> None:
+    collinear = 1e-7  # width over length of points on a line: rounding leaves 1.3e-8
+    thickest = 0.7  # thickness over width; of 300 balls of 100 points 1 % have less than .77
     problem = ""
     if sizes[-1] == 0.0 or (sizes.size == 3 and sizes[1] <= collinear * sizes[-1]):
         problem = "points that span a plane, got points on one line or at one place"

@@ -106,12 +106,7 @@ def texture(surface: xr.DataArray) -> xr.Dataset:
     return result
 
 
-def _correlation(
-    heights: Array,
-    spacing: Sequence[float],
-    periodic: Sequence[bool],
-    rays: int = 360,  # over the half circle; 1440 change lengths by 2e-5 and the aspect ratio by 6e-5
-) -> list[float]:
+def _correlation(heights: Array, spacing: Sequence[float], periodic: Sequence[bool]) -> list[float]:
     """Return the shortest distance at which the autocorrelation has fallen, and its ratio to the longest."""
     rows = np.atleast_2d(heights)
     observed = np.isfinite(rows)
@@ -121,6 +116,7 @@ def _correlation(
     values = np.where(observed, values - values[observed].mean(), 0.0)
     steps = (spacing[-1] if heights.ndim == 1 else spacing[0], spacing[-1])
     acf, reach = _autocorrelation(values, observed, (False, *periodic)[-2:])
+    rays = 360  # over the half circle; 1440 change lengths by 2e-5 and the aspect ratio by 6e-5
     angles = np.zeros(1) if heights.ndim == 1 else np.arange(rays) * np.pi / rays
     lengths = np.array([_decay(acf, reach, steps, float(angle)) for angle in angles])
     if np.isnan(lengths).all():
@@ -144,13 +140,7 @@ def _autocorrelation(
     return mean / mean[reach[0], reach[1]], (reach[0], reach[1])
 
 
-def _decay(
-    acf: Array,
-    reach: tuple[int, int],
-    steps: tuple[float, float],
-    angle: float,
-    per_point: int = 4,  # values in a spacing along the ray; 16 change lengths by .2 %, 1 by 1.5 %
-) -> float:
+def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle: float) -> float:
     """Return the distance along a ray at which the autocorrelation falls to `DECAY`; NaN if it does not."""
     from scipy.ndimage import map_coordinates
 
@@ -158,6 +148,7 @@ def _decay(
     # not of the axis across a ray along the other; 1e-12 and 1e-6 gave the same bits
     limits = [lag / abs(u) for lag, u in zip(reach, unit, strict=True) if abs(u) > 1e-9 * max(map(abs, unit))]
     longest = min(limits)
+    per_point = 4  # values in a spacing along the ray; 16 change lengths by .2 %, 1 by 1.5 %
     number = 2 + int(per_point * longest * max(map(abs, unit)))
     distance = np.linspace(0.0, longest, number)
     places = [lag + u * distance for lag, u in zip(reach, unit, strict=True)]
