@@ -229,9 +229,8 @@ def least_flow(network: Network, axis: int, inside: Array, ends: Sequence[Array]
     chosen = (network.axis == axis) & inside[network.i]
     line = np.unravel_index(network.i[chosen], network.shape)[1 - axis]
     count = network.shape[1 - axis]
-    resistance = np.bincount(line, 1.0 / network.conductance[chosen], count).astype(
-        float
-    )  # also without links
+    resistance = np.bincount(line, 1.0 / network.conductance[chosen], count)
+    resistance = resistance.astype(float)  # also without links
     crosses = np.bincount(line, minlength=count) == network.shape[axis] - (len(ends) > 0)
     for end in ends:
         crosses &= end > 0

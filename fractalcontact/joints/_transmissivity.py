@@ -221,8 +221,12 @@ def gap_flows(
     ]
 
 
-def _no_flow(shape: tuple[int, ...]) -> Flow:
-    return Flow(0.0, False, 0.0, np.full(shape, np.nan), np.zeros((2, *shape)))
+def _without_maps(
+    shape: tuple[int, ...], conductivity: float = 0.0, *, percolates: bool = False, residual: float = 0.0
+) -> Flow:
+    """Return that nothing flows, or that the flow is not known (NaN)."""
+    flux = np.full((2, *shape), conductivity)
+    return Flow(conductivity, percolates, residual, np.full(shape, np.nan), flux)
 
 
 def _flow_along(
@@ -239,19 +243,15 @@ def _flow_along(
             held.add(_flow_network.line_of(axis, place), end, level)
         inside = _flow_network.spanning_cells(network, axis, ends)
     if not inside.any():
-        return _no_flow(cells.shape)
+        return _without_maps(cells.shape)
     pressure, error = pressures(network, inside, order, held, axis)
     flow = _flow_network.dissipation(network, pressure, inside, held)
     least = _flow_network.least_flow(network, axis, inside, ends)
     residual = max(least / flow - 1.0, error)
     if not residual <= ERROR:
-        return Flow(
-            math.nan, True, residual, np.full(cells.shape, np.nan), np.full((2, *cells.shape), np.nan)
-        )
+        return _without_maps(cells.shape, math.nan, percolates=True, residual=residual)
     spacing = (ratio, 1.0)
-    length, width = (n * step for n, step in zip(cells.shape, spacing, strict=True))
-    if axis == 1:
-        length, width = width, length
+    length, width = (cells.shape[each] * spacing[each] for each in (axis, 1 - axis))
     flows = _flow_network.cell_flows(network, pressure, inside, axis, ends)
     flux = flows * length / 12.0 / np.array(spacing[::-1])[:, None, None]
     pressure = np.where(inside.reshape(cells.shape), pressure, np.nan)
