@@ -131,8 +131,7 @@ class LinePanel:
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
         for number, own in enumerate(self.family.styles):
             self.line(self.family.curve(what, number), x[number], y[number], **(own | style))
-        if key:
-            self.key(key, **style)
+        self.key(key, **style)
 
     def line(self, name: str, x: Any, y: Any, *, key: str = "", **style: Any) -> None:
         """Draw one curve."""
@@ -140,8 +139,7 @@ class LinePanel:
         marker = "o" if x.size <= self.points else ""
         self.ax.plot(self.x.scale(x), self.y.scale(y), label=name, **({"marker": marker} | style))
         self.drawn.append((x, y))
-        if key:
-            self.key(key, **style)
+        self.key(key, **style)
 
     def flagged(self, name: str, x: Any, y: Any, reliable: Array, **style: Any) -> None:
         """Draw points: filled ones where they are reliable, hollow ones elsewhere."""
@@ -162,14 +160,12 @@ class LinePanel:
     def level(self, y: float, *, key: str = "", **style: Any) -> None:
         """Draw a horizontal line of reference."""
         self.ax.axhline(float(self.y.scale(y)), **style)
-        if key:
-            self.key(key, **style)
+        self.key(key, **style)
 
     def place(self, x: float, *, key: str = "", **style: Any) -> None:
         """Draw a vertical line of reference."""
         self.ax.axvline(float(self.x.scale(x)), **style)
-        if key:
-            self.key(key, **style)
+        self.key(key, **style)
 
     def mark(self, x: Any, y: Any, colour: Any, first: int = 0, size: float = 14.0) -> None:
         """Mark points of a curve with letters in circles of `size` points, from letter number `first` on.
@@ -197,12 +193,13 @@ class LinePanel:
             text.set_in_layout(False)
 
     def key(self, label: str, **style: Any) -> None:
-        """Add an entry to the legend of the kinds of curves, on lines of a legend's width.
+        """Add an entry to the legend of the kinds of curves, on lines of its width; none without a label.
 
         Its 24 characters are 1.35 inches in the size of legends, a quarter of a panel with its legend.
         """
-        text = label if "$" in label else textwrap.fill(label, 24)  # symbols are shorter than written
-        self.entries.append(_style.legend_line(text, **style))
+        if label:
+            text = label if "$" in label else textwrap.fill(label, 24)  # symbols are shorter than written
+            self.entries.append(_style.legend_line(text, **style))
 
     def area_key(self, label: str, **style: Any) -> None:
         """Add the entry of a filled area."""
