@@ -17,7 +17,7 @@ import numpy as np
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.files import DAMAGED, NETCDF_LOCK, require_checksum
 from fractalcontact.base.study import provenance_of
-from fractalcontact.base.tables import Note, screen_width, table
+from fractalcontact.base.tables import note, screen_width, table
 from fractalcontact.base.validation import Problems, reading
 
 SHARED = "parts that ran at the same time are each counted in full, so that all stages exceed the total"
@@ -229,4 +229,4 @@ def _reason_lines(group: Header) -> Iterable[str]:
     order = [str(name) for name in group.values.get("method", ())]
     for key in REMARKS if order else ():
         for concerned, remark in remarks(order, group.values.get(key, [])).items():
-            yield str(Note(f"{concerned}: {remark}", indent=4))
+            yield note(f"{concerned}: {remark}", indent=4)

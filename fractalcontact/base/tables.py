@@ -6,7 +6,6 @@ import re
 import shutil
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 
 from tabulate import tabulate
@@ -81,23 +80,7 @@ def _longest_word(cell: str, most: int = 24) -> int:
     return min(most, max((len(word) for word in re.split(r" |(?<=-)", cell)), default=0))
 
 
-@dataclass(frozen=True)
-class Table:
-    """A table of words, the first row its head; as text it has aligned columns."""
-
-    rows: Sequence[Sequence[str]]
-
-    def __str__(self) -> str:
-        return table(self.rows)
-
-
-@dataclass(frozen=True)
-class Note:
-    """A remark, as text indented below its table and wrapped to the width of the screen."""
-
-    words: str
-    indent: int = 2
-
-    def __str__(self) -> str:
-        first, rest = " " * self.indent, " " * (self.indent + 2)
-        return textwrap.fill(self.words, screen_width(), initial_indent=first, subsequent_indent=rest)
+def note(words: str, indent: int = 2) -> str:
+    """Return a remark, indented below its table and wrapped to the width of the screen."""
+    first, rest = " " * indent, " " * (indent + 2)
+    return textwrap.fill(words, screen_width(), initial_indent=first, subsequent_indent=rest)

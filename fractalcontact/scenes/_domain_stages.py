@@ -53,9 +53,7 @@ def _beside_null(name: str, null: str) -> Any:
 def _middle_box(state: xr.Dataset) -> str | None:
     if "box_size" not in state.dims:
         return None
-    if "box_length" in state:
-        return length(float(state["box_length"][state.sizes["box_size"] // 2]))
-    return f"{int(state['box_size'][state.sizes['box_size'] // 2])} cells"
+    return length(float(state["box_length"][state.sizes["box_size"] // 2]))
 
 
 def _crosses(state: xr.Dataset) -> str | None:

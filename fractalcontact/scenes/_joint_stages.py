@@ -32,12 +32,9 @@ def _jrc(state: xr.Dataset) -> Any:
     return jrc_text(float(value)) if value is not None and value.ndim == 0 and value < 0 else value
 
 
-def _jrc_scatter(state: xr.Dataset) -> str | None:
+def _jrc_scatter(state: xr.Dataset) -> str:
     """Return the ends of the scatter of the profiles; words for those below the scale."""
-    names = ("roughness_coefficient_low", "roughness_coefficient_high")
-    if not set(names) <= set(state.variables):
-        return None
-    low, high = (float(state[name].mean()) for name in names)
+    low, high = (float(state[f"roughness_coefficient_{end}"].mean()) for end in ("low", "high"))
     if not np.isfinite(low + high):
         return "none"
     return " to ".join(dict.fromkeys((jrc_text(low), jrc_text(high))))

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.file_contents import stage_rows
 from fractalcontact.base.study import group_of, member_count, of_member
-from fractalcontact.base.tables import Note, table
+from fractalcontact.base.tables import note, table
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._caveats import aperture_as_placed, caveats
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
@@ -142,11 +142,11 @@ def _screen_text(whole: Summary, lines: int = 36, most: int = 3) -> str:
     A command adds what it has written, 40 lines in all.
     """
     tables = joined_tables([each.selected(each.on_screen) for each in whole.tables if each.on_screen])
-    ends = [str(Note(caveat, indent=0)) for caveat in whole.caveats[:most]]
+    ends = [note(caveat, indent=0) for caveat in whole.caveats[:most]]
     left_out = len(whole.caveats) - most
     ends += [f"caveats left out: {left_out}; {MORE}"] if left_out > 0 else []
-    single = [str(_as_line(each)) for each in tables if not each.key_heads]
-    head = "\n".join([whole.title, *(str(Note(fact, indent=0)) for fact in whole.facts), *single])
+    single = [_as_line(each) for each in tables if not each.key_heads]
+    head = "\n".join([whole.title, *(note(fact, indent=0) for fact in whole.facts), *single])
     foot = ["\n".join(ends)] if ends else []
     left = lines - sum(part.count("\n") + 2 for part in [head, *foot])
     return "\n\n".join([head, *_fitted([each for each in tables if each.key_heads], left), *foot])
@@ -173,19 +173,19 @@ def _fitted(tables: Sequence[ResultTable], lines: int) -> list[str]:
     return [*shown, f"tables left out: {left_out}; {MORE}"] if left_out else shown
 
 
-def _as_line(one_row: ResultTable) -> Note:
+def _as_line(one_row: ResultTable) -> str:
     """Return a table with a single row and no key as a line."""
     cells = ", ".join(f"{head} {cell}" for head, cell in zip(one_row.heads, one_row.cells[0], strict=True))
-    return Note(f"{one_row.title}: {cells}", indent=0)
+    return note(f"{one_row.title}: {cells}", indent=0)
 
 
 def _verbose_text(whole: Summary) -> str:
     """Return all of a summary as text."""
-    sections = ["\n".join([whole.title, *(str(Note(fact, indent=0)) for fact in whole.facts)])]
+    sections = ["\n".join([whole.title, *(note(fact, indent=0) for fact in whole.facts)])]
     for each in whole.tables:
-        lines = [each.title, table(written_rows(each)), *(str(Note(remark)) for remark in each.remarks)]
+        lines = [each.title, table(written_rows(each)), *(note(remark) for remark in each.remarks)]
         sections.append("\n".join(lines))
-    sections += ["\n".join(str(Note(caveat)) for caveat in whole.caveats)] if whole.caveats else []
+    sections += ["\n".join(note(caveat) for caveat in whole.caveats)] if whole.caveats else []
     sections += [table(whole.stages)] if whole.stages else []
     return "\n\n".join(sections)
 

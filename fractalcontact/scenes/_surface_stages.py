@@ -26,9 +26,7 @@ def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         yield "The intervals are those of one surface: the means of their ends."
 
 
-def _misfit(state: xr.Dataset) -> str | None:
-    if "misfit" not in state:
-        return None
+def _misfit(state: xr.Dataset) -> str:
     text = plain(np.abs(state["misfit"]), 1)
     return "" if text == "-" else f"z = {text}"
 
