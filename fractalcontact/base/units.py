@@ -13,26 +13,16 @@ from fractalcontact.base.numbers import Array
 # units per metre, or metres per unit: whichever is an integer, so that the conversion rounds only once
 PER_METRE = {"dm": 1e1, "cm": 1e2, "mm": 1e3, "um": 1e6, "nm": 1e9, "angstrom": 1e10, "pm": 1e12}
 METRES = {"m": 1.0, "km": 1e3, "inch": 0.0254}
-SPELLINGS = {
-    "\u00b5m": "um",  # the micro sign
-    "\u03bcm": "um",  # the Greek letter
-    "micron": "um",
-    "microns": "um",
-    "micrometer": "um",
-    "micrometre": "um",
-    "millimeter": "mm",
-    "millimetre": "mm",
-    "nanometer": "nm",
-    "nanometre": "nm",
-    "meter": "m",
-    "metre": "m",
-    "\u212b": "angstrom",  # the Angstrom sign
-    "\u00c5": "angstrom",  # the letter
-    "Angstrom": "angstrom",
-    "A": "angstrom",
-    "in": "inch",
-    "inches": "inch",
+_SPELLINGS = {
+    # the micro sign, the Greek letter
+    "um": ("\u00b5m", "\u03bcm", "micron", "microns", "micrometer", "micrometre"),
+    "mm": ("millimeter", "millimetre"),
+    "nm": ("nanometer", "nanometre"),
+    "m": ("meter", "metre"),
+    "angstrom": ("\u212b", "\u00c5", "Angstrom", "A"),  # the Angstrom sign, the letter
+    "inch": ("in", "inches"),
 }
+SPELLINGS = {word: unit for unit, words in _SPELLINGS.items() for word in words}
 UNITS = (*METRES, *PER_METRE, *SPELLINGS)
 PREFIXES = {
     18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"

@@ -302,12 +302,6 @@ def _home_of(key: str) -> str:
     return f": {name!r} belongs to {', '.join(homes[:-1])}{' or ' if homes[1:] else ''}{homes[-1]}"
 
 
-def has_scans(scene: Scene) -> bool:
-    """Return whether a scene reads several files: a pattern or a list."""
-    reads = (scene.table(name).get("read") for name in ("surface", "upper"))
-    return any(isinstance(read, list) or is_pattern(read, scene.folder) for read in reads)
-
-
 def scans_of(scene: Scene) -> dict[str, Scene]:
     """Return the scene of every scan by its name; empty for a scene of one surface.
 
@@ -319,9 +313,9 @@ def scans_of(scene: Scene) -> dict[str, Scene]:
     InvalidInput
         No file has such a name, or lower and upper faces do not match; the error lists them.
     """
-    if not has_scans(scene):
-        return {}
     reads = {name: scene.table(name)["read"] for name in ("surface", "upper") if "read" in scene.table(name)}
+    if not any(isinstance(read, list) or is_pattern(read, scene.folder) for read in reads.values()):
+        return {}
     with Problems(f"scene {scene.name}") as problems:
         problems.require("surface" in reads, "surface.read", "a lower face for every upper one", NONE)
     with problems:
