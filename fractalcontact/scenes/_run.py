@@ -277,9 +277,8 @@ def _save_and_draw(tree: xr.DataTree, scene: Scene, folder: Path, progress: bool
 
 def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) -> None:
     with Problems("fractalcontact.scenes.run") as problems:
-        problems.boolean("summary", summary)
-        problems.boolean("verbose", verbose)
-        problems.boolean("force", force)
+        for name, flag in (("summary", summary), ("verbose", verbose), ("force", force)):
+            problems.boolean(name, flag)
         if problems.integer("workers", workers, at_least=0, at_most=most_workers()) and workers:
             problems.require(client is None, "workers / client", "one of them", "both of them")
         workers_of(client)
@@ -403,7 +402,8 @@ class ScanStudies:
         place = self.folder / SCANS
         tasks = {name: _ScanTask(scene, place / folder_of(name)) for name, scene in self.scans.items()}
         # of formats with two bytes for each point, the smallest
-        points = max((source.stat().st_size // 2 for source in self._sources()), default=0)
+        sources = (each.folder / os.path.expandvars(str(each.surface.read)) for each in self.scans.values())
+        points = max((source.stat().st_size // 2 for source in sources if source.is_file()), default=0)
         finished = run_tasks(tasks, PartStore(self.folder), stop, workers, points=points)
         found: dict[str, tuple[str, Numbers]] = {}
         for name, result in signals.track(finished, progress, SCANS, unit=SCAN, total=len(names)):
@@ -425,12 +425,6 @@ class ScanStudies:
         self.reasons[name], self.numbers[name] = reason, numbers
         place = f"/{SCANS}/{result.parent.name}"
         file.add_groups({place + path: maps for path, maps in netcdf.groups_over(result, MAP_DIMS).items()})
-
-    def _sources(self) -> Iterator[Path]:
-        for scene in self.scans.values():
-            file = scene.folder / os.path.expandvars(str(scene.surface.read))
-            if file.is_file():
-                yield file
 
     @property
     def missing(self) -> int:
@@ -467,18 +461,12 @@ class ScanStudies:
 
     def _overview(self) -> xr.Dataset:
         """Return a row for every scan: what stands for its study, whether it failed, and why."""
-        names, roots = list(self.reasons), {name: each[""] for name, each in self.numbers.items()}
+        roots, reasons = {name: each[""] for name, each in self.numbers.items()}, self.reasons
         table = _result_tree.in_words(self.main(), with_group=False)
-        table["status"] = (
-            SCAN,
-            [
-                "failed" if name not in roots else "incomplete" if self.reasons[name] else "done"
-                for name in names
-            ],
-        )
-        table["reason"] = (SCAN, [self.reasons[name] for name in names], {"long_name": "why it failed"})
-        caveats = {
-            name: str(root.attrs.get("caveats", "none")).replace("none", "") for name, root in roots.items()
-        }
-        table["caveats"] = (SCAN, [caveats.get(name, "") for name in names])
+        done = {name: "incomplete" if reasons[name] else "done" for name in roots}
+        caveats = {name: str(root.attrs.get("caveats", "none")) for name, root in roots.items()}
+        found = [caveats.get(name, "none") for name in reasons]
+        table["status"] = (SCAN, [done.get(name, "failed") for name in reasons])
+        table["reason"] = (SCAN, list(reasons.values()), {"long_name": "why it failed"})
+        table["caveats"] = (SCAN, ["" if text == "none" else text for text in found])
         return label(table, keep_notes=True)
