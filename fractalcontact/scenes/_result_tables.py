@@ -182,7 +182,7 @@ def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> li
         found = [values(state) for state in states]
         if all(item is None for item in found):
             return None
-        return [_text(item, column.decimals) if item is not None else "-" for item in found]
+        return [cell(item, column.decimals) if item is not None else "-" for item in found]
     if isinstance(values, tuple):
         if not set(values) <= set(data.variables):
             return None
@@ -191,10 +191,11 @@ def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> li
     if values not in data.variables:
         return None
     scale = column_scale(data[values]) if column.decimals is None and data[values].dtype.kind == "f" else None
-    return [_text(state[values], column.decimals, scale) for state in states]
+    return [cell(state[values], column.decimals, scale) for state in states]
 
 
-def _text(value: Any, decimals: int | None, scale: Scale | None = None) -> str:
+def cell(value: Any, decimals: int | None, scale: Scale | None = None) -> str:
+    """Return a value as text: a number with so many decimals, or with its unit, see `amount`."""
     if isinstance(value, str):
         return value
     if value.dtype.kind == "b":
@@ -214,7 +215,7 @@ def interval(low: xr.DataArray, high: xr.DataArray, decimals: int | None) -> str
     ends = [end.mean(keep_attrs=True) for end in (low, high)]
     if not all(np.isfinite(end.values) for end in ends):
         return "none"
-    return " to ".join(amount(end) if decimals is None else plain(end, decimals) for end in ends)
+    return " to ".join(cell(end, decimals) for end in ends)
 
 
 def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:

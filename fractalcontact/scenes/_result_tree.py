@@ -19,16 +19,7 @@ from fractalcontact.base import provenance, schema
 from fractalcontact.base.regression import is_far, random_effects
 from fractalcontact.base.study import MEMBER, group_of, joined_references, provenance_of
 from fractalcontact.scenes._joint_stages import JRC_COLUMN
-from fractalcontact.scenes._result_tables import (
-    SCAN,
-    Column,
-    ResultTable,
-    Rows,
-    amount,
-    column_scale,
-    plain,
-    table_of,
-)
+from fractalcontact.scenes._result_tables import SCAN, Column, ResultTable, Rows, cell, column_scale, table_of
 from fractalcontact.scenes._scene import Scene
 
 if TYPE_CHECKING:
@@ -247,11 +238,11 @@ def scan_tables(tree: xr.DataTree) -> Iterator[ResultTable]:
             continue
         scale = column_scale(root[name])
         mean, low, high, scatter = (
-            amount(each, scale=scale) if decimals is None else plain(each, decimals)
+            cell(each, decimals, scale)
             for each in (root[f"{name}{end}"].rename(name) for end in ("", "_low", "_high", "_scatter"))
         )
         keys.append((head,))
-        count = plain(root[f"{name}_scans"], 0)
+        count = cell(root[f"{name}_scans"], 0)
         cells.append((mean, "none" if low == "-" else f"{low} to {high}", scatter, count))
     heads = ("mean", "95 % interval", "scatter between scans", "scans")
     yield ResultTable("means over the scans", ("quantity",), tuple(keys), heads, tuple(cells), heads)

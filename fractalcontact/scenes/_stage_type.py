@@ -18,6 +18,7 @@ from fractalcontact.scenes._scene import LOADS
 
 CONTACT_MAPS, ISLAND_MAP = ("state", "pressure", "gap"), "label"
 SLIP_MAPS = ("slip_state", "traction_x", "traction_y", "slip_x", "slip_y")
+MAPS = (*CONTACT_MAPS, *SLIP_MAPS, ISLAND_MAP)
 PARTIAL_SLIP = "partial_slip"
 # arguments that a scene states elsewhere: surfaces, maps, what to keep, progress bars
 FROM_SCENE = frozenset((

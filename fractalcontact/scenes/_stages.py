@@ -20,14 +20,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _domain_stages, _inputs, _joint_stages, _surface_stages
 from fractalcontact.scenes._domain_stages import SIGNATURE
 from fractalcontact.scenes._scene import LOADS, Scene
-from fractalcontact.scenes._stage_type import (
-    CONTACT_MAPS,
-    ISLAND_MAP,
-    SLIP_MAPS,
-    StageType,
-    arguments_of,
-    public_function,
-)
+from fractalcontact.scenes._stage_type import ISLAND_MAP, MAPS, StageType, arguments_of, public_function
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +38,7 @@ STAGES: Mapping[str, StageType] = {row.name: row for row in _ROWS}
 WANTED: Mapping[str, tuple[str, ...]] = {
     name: tuple(word for table, _, word in (row.wanted.partition(".") for row in _ROWS) if table == name)
     for name in ("surfaces", "contact", "joints", "domains")
-} | {"keep": (*CONTACT_MAPS, *SLIP_MAPS, ISLAND_MAP)}
+} | {"keep": MAPS}
 
 
 @dataclass(frozen=True)
