@@ -188,16 +188,8 @@ def _variable_lines(group: Header) -> Iterable[str]:
     for name, dims, words in rows:
         line = f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
         # 6 blanks between the columns, but no more than half a line
-        yield from _wrapped(line, min(6 + widths[0] + widths[1], screen_width() // 2))
-
-
-def _wrapped(line: str, indent: int) -> Iterable[str]:
-    """Yield a line in columns in the width of the screen, the rest of it below its last column."""
-    if len(line) <= screen_width():
-        return [line]
-    cut = line.rfind(" ", 0, screen_width() + 1)
-    rest = textwrap.wrap(line[cut:].strip(), screen_width() - indent)
-    return [line[:cut].rstrip(), *(" " * indent + part for part in rest)]
+        indent = " " * min(6 + widths[0] + widths[1], screen_width() // 2)
+        yield from textwrap.wrap(line, screen_width(), subsequent_indent=indent)
 
 
 def _is_achieved(name: str) -> bool:
