@@ -135,22 +135,18 @@ def _free_of_groups(root: Path) -> Iterator[Free]:
         for folder in folders:
             group = folder / path.lstrip("/")
             for place in (group, *group.parents):
-                if not place.is_relative_to(folder):
-                    break
-                free = _free_of_group(place, *names)
-                if free is not None:
-                    yield free
+                if place.is_relative_to(folder):
+                    yield from _free_of_group(place, *names)
 
 
-def _free_of_group(folder: Path, limit: str, used: str, prefix: str) -> Free | None:
-    """Return what a control group leaves; None where it sets no limit."""
+def _free_of_group(folder: Path, limit: str, used: str, prefix: str) -> Iterator[Free]:
+    """Yield what a control group leaves, where it sets a limit."""
     words = [" ".join(_lines(folder / name)).strip() for name in (limit, used)]
-    if not all(word.isdecimal() for word in words):
-        return None
-    most, taken = (float(word) for word in words)
-    pages = numbers_in(folder / "memory.stat")
-    files = sum(pages.get(f"{prefix}{kind}_file", 0) for kind in ("active", "inactive"))
-    return Free(max(0.0, most - max(0.0, taken - files)), "limit of the control group (container or job)")
+    if all(word.isdecimal() for word in words):
+        most, taken = (float(word) for word in words)
+        pages = numbers_in(folder / "memory.stat")
+        files = sum(pages.get(f"{prefix}{kind}_file", 0) for kind in ("active", "inactive"))
+        yield Free(max(0.0, most - max(0.0, taken - files)), "limit of the control group (container or job)")
 
 
 def _lines(path: Path) -> list[str]:
@@ -344,15 +340,12 @@ def in_bands(function: Callable[..., None], count: int, work: int, *arguments: A
     threads = min(count, work // SHARE)
     if threads > 1:  # only then: reading the environment takes as long as a small loop
         threads = min(threads, thread_count())
-    if threads <= 1:
+    queue = _worker_queue(threads - 1) if threads > 1 else None
+    if queue is None:
         function(0, count, *arguments)
         return
     edges = [count * k // threads for k in range(threads + 1)]
     bands = [_Band(function, (edges[k], edges[k + 1], *arguments)) for k in range(1, threads)]
-    queue = _worker_queue(threads - 1)
-    if queue is None:
-        function(0, count, *arguments)
-        return
     for band in bands:
         queue.put(band)
     try:
