@@ -359,7 +359,7 @@ def writing(where: str, argument: str, path: str | PathLike[str]) -> Iterator[No
     try:
         yield
     except OSError as error:
-        message = f"{argument}: expected a place to write, got {Path(path).name!r}: {error.strerror or error}"
+        message = f"{argument}: {Path(path).name!r} cannot be written here: {error.strerror or error}"
         raise InvalidInput(where, [message]) from error
 
 

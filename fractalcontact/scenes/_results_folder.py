@@ -32,7 +32,7 @@ from fractalcontact.base.provenance import with_load_indexes
 from fractalcontact.base.schema import encoded
 from fractalcontact.base.signals import Stopped
 from fractalcontact.base.study import scene_of
-from fractalcontact.base.validation import Problems, Words
+from fractalcontact.base.validation import Problems, Words, writing
 from fractalcontact.scenes._inputs import crack_options, locate, stage_options
 from fractalcontact.scenes._scene import Scene
 
@@ -240,16 +240,11 @@ def _write_part(result: xr.Dataset, path: Path) -> None:
         for place, variables in parts.items()
     }
     header = json.dumps(content | {"attrs": result.attrs}, default=put)
-    try:
+    with writing("fractalcontact.scenes.run", "out", path):
         path.parent.mkdir(parents=True, exist_ok=True)
         files.clear_partial(path.parent)
         with files.written_whole(path) as temporary, temporary.open("wb") as file:
             _write_arrays(file, {_HEADER: np.array(header)} | arrays)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise errors.InvalidInput(
-            "fractalcontact.scenes.run", [f"out: {path.name!r} cannot be written here: {reason}"]
-        ) from error
 
 
 def _write_arrays(file: IO[bytes], arrays: Mapping[str, np.ndarray[Any, Any]]) -> None:
