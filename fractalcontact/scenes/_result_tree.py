@@ -100,13 +100,8 @@ def note_run_time(tree: xr.DataTree, start: float) -> None:
 
 def _achieved(result: xr.Dataset) -> dict[str, Any]:
     """Return the accuracy that a result reports: numbers, or words where it has none."""
-    facts: dict[str, Any] = {}
-    if "residual" in result:
-        facts["residual"] = float(result["residual"].max())
-    if "converged" in result:
-        facts["converged"] = bool(result["converged"].all())
-    if "iterations" in result:
-        facts["iterations"] = int(result["iterations"].sum())
+    of_all = {"residual": xr.DataArray.max, "converged": xr.DataArray.all, "iterations": xr.DataArray.sum}
+    facts = {name: reduce(result[name]).item() for name, reduce in of_all.items() if name in result}
     if "standard_error" in result:
         by_method = np.atleast_1d(result["standard_error"].values)
         by_method = by_method.reshape(-1, by_method.shape[-1]).T  # the members of an ensemble come first
