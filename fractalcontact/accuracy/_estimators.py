@@ -180,31 +180,27 @@ def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[i
     return counts if len(counts) == len(sizes) else counts[:1] * len(sizes)
 
 
-def _brownian(axes: int, hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
-    shape = (n + 2 * margin,) * axes
+def _brownian(axes: int, hurst: float, _: int, wide: int, count: int, stream: Stream) -> xr.DataArray:
+    shape = (wide,) * axes
     return surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=HEIGHT, members=count, rng=stream)
 
 
-def _crop(hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
-    wide = n + 2 * margin
+def _crop(hurst: float, n: int, wide: int, count: int, stream: Stream) -> xr.DataArray:
     options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
-    periodic = surfaces.spectral((2 * n + 2 * margin,) * 2, SPACING, rms_height=HEIGHT, **options)
+    periodic = surfaces.spectral((n + wide,) * 2, SPACING, rms_height=HEIGHT, **options)
     steps = np.diff(periodic.values, axis=-1)
     result = (periodic * (HEIGHT / np.sqrt(np.mean(steps**2)))).isel(y=slice(wide), x=slice(wide))
     return surfaces.from_array(result.values, SPACING)
 
 
-def _rolled_off(hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
-    wide = (n + 2 * margin,) * 2
-    return surfaces.from_array(HEIGHT * matern(wide, hurst, n / ROLLOFF, count, stream), SPACING)
+def _rolled_off(hurst: float, n: int, wide: int, count: int, stream: Stream) -> xr.DataArray:
+    return surfaces.from_array(HEIGHT * matern((wide, wide), hurst, n / ROLLOFF, count, stream), SPACING)
 
 
-def _band(hurst: float, n: int, margin: int, count: int, stream: Stream) -> xr.DataArray:
-    del margin  # it is periodic
-    cutoff = SHORTEST * SPACING
-    return surfaces.spectral(
-        (n, n), SPACING, rms_height=10 * HEIGHT, short_cutoff=cutoff, hurst=hurst, members=count, rng=stream
-    )
+def _band(hurst: float, n: int, _: int, count: int, stream: Stream) -> xr.DataArray:
+    options: dict[str, Any] = {"hurst": hurst, "members": count, "rng": stream}
+    height, cutoff = 10 * HEIGHT, SHORTEST * SPACING
+    return surfaces.spectral((n, n), SPACING, rms_height=height, short_cutoff=cutoff, **options)
 
 
 @dataclass(frozen=True)
@@ -215,8 +211,8 @@ class Family:
     ----------
     words : str
     make : function
-        Of the exponent, points along an edge, points of a margin around them, the number of surfaces, and the
-        random stream.
+        Of the exponent, points along an edge, and along one with a margin at both ends, the number of
+        surfaces, and the random stream.
     bound : function
         The Cramer-Rao bound, of the exponent, points along an edge, and the spread of a blur in spacings.
     is_free : bool
@@ -258,9 +254,9 @@ def _surfaces(
 ) -> xr.DataArray:
     """Return surfaces of a family; free ones are made with a margin, blurred, and get noise and marks."""
     if not family.is_free:
-        return family.make(hurst, n, 0, count, stream)
+        return family.make(hurst, n, n, count, stream)
     margin = int(np.ceil(5.0 * defects["blur"]))  # the Gaussian filter of SciPy ends at 4 spreads
-    result = family.make(hurst, n, margin, count, stream)
+    result = family.make(hurst, n, n + 2 * margin, count, stream)
     if margin:
         spread = (0.0, *[defects["blur"]] * (result.ndim - 1))
         result = result.copy(data=gaussian_filter(result.values, spread))

@@ -29,7 +29,15 @@ HEIGHT_STATISTICS = (
     "peak_to_valley",
     "skewness",
     "kurtosis",
+    "missing_points",
 )
+
+
+def _names(axes: int) -> list[str]:
+    """Return the statistics of a surface with so many axes."""
+    slopes = [f"{kind}_slope_{dim}" for dim in ("y", "x")[2 - axes :] for kind in ("rms", "mean")]
+    of_area = ["developed_area_ratio", "developed_area_excess"]
+    return [*HEIGHT_STATISTICS, "rms_slope", "rms_curvature", "nayak_parameter", *slopes, *of_area]
 
 
 def _check(problems: Problems) -> None:
@@ -39,8 +47,7 @@ def _check(problems: Problems) -> None:
     else:
         check_stack(problems, smallest=3)
     if isinstance(surface, xr.DataArray):
-        names = _gradient_names(len(core_dims(surface)))
-        check_leading(surface, (*HEIGHT_STATISTICS, "missing_points", *names, "run_time"), problems)
+        check_leading(surface, (*_names(len(core_dims(surface))), "run_time"), problems)
 
 
 @public_result(
@@ -110,7 +117,7 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     else:
         stack = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
         rows = [_statistics(heights, grid.spacing, grid.periodic) for heights in stack]
-    result = labelled_rows(surface, rows)
+    result = labelled_rows(surface, rows, _names(len(grid.shape)))
     by_modes = all(grid.periodic) and not has_blocks(surface) and not result["missing_points"].any()
     result.attrs["derivatives"] = "modes" if by_modes else "differences"
     _explain_missing(result, math.prod(grid.shape))
@@ -139,7 +146,7 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     """
     complete = not np.isnan(heights.min())
     if not complete and np.isnan(heights).all():
-        return _nothing(heights.shape)
+        return {"missing_points": heights.size}
     values, reference, scale = shifted(heights)
     known = values if complete else values[~np.isnan(values)]
     mean, ends = float(known.mean()), (float(known.min()), float(known.max()))
@@ -170,7 +177,7 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
         expected = "finite heights, or NaN where missing"
         problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
     if not size:
-        return _nothing(surface.shape)
+        return {"missing_points": surface.size}
     scale = power_of_two(high - low)
     mean, (unit, steps) = (total / size + (origin - low)) / scale, _scaled_steps(spacing)
     x, half = np.linspace(-1.0, 1.0, nx), 0.5 * max(ny - 1, 1)
@@ -230,12 +237,6 @@ def _scaled_steps(spacing: Sequence[float]) -> tuple[float, list[float]]:
     return unit, [step / unit for step in spacing]
 
 
-def _nothing(shape: Sequence[int]) -> dict[str, float]:
-    """Return the statistics of a surface of which nothing was observed."""
-    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan) | {"missing_points": math.prod(shape)}
-    return result | dict.fromkeys(_gradient_names(len(shape)), math.nan)
-
-
 def _gradients(
     neighbours: Sequence[float],
     mean: tuple[float, ...],
@@ -246,29 +247,24 @@ def _gradients(
 ) -> dict[str, float]:
     """Return the statistics of slopes, curvature and area; `mean` are the mean slopes."""
     *squares, laplacian_square, excess = neighbours
-    ratio, result = scale / unit, dict[str, float]()
+    ratio = scale / unit
     if by_modes is None:
         height = (rms_height / scale) ** 2
         moments = spectra.Moments(height, sum(squares), laplacian_square, len(squares))
         along = tuple(math.sqrt(square) for square in squares)
     else:
         moments, along = by_modes
-    result["rms_slope"] = moments.rms_slope * ratio
-    result["rms_curvature"] = moments.rms_curvature * ratio / unit
-    result["nayak_parameter"] = moments.nayak
+    result = {
+        "rms_slope": moments.rms_slope * ratio,
+        "rms_curvature": moments.rms_curvature * ratio / unit,
+        "nayak_parameter": moments.nayak,
+        "developed_area_ratio": 1.0 + excess,
+        "developed_area_excess": excess,
+    }
     for name, rms, slope in zip(("y", "x")[2 - len(squares) :], along, mean, strict=True):
         result[f"rms_slope_{name}"] = rms * ratio
         result[f"mean_slope_{name}"] = scale * slope
-    result["developed_area_ratio"] = 1.0 + excess
-    result["developed_area_excess"] = excess
     return result
-
-
-def _gradient_names(axes: int) -> list[str]:
-    names = ["rms_slope", "rms_curvature", "nayak_parameter", "developed_area_ratio", "developed_area_excess"]
-    return names + [
-        f"{statistic}_slope_{dim}" for dim in ("y", "x")[2 - axes :] for statistic in ("rms", "mean")
-    ]
 
 
 def _powers(values: Array, mean: float) -> Array:
@@ -284,18 +280,17 @@ def _heights(
     powers: Array, size: int, mean: float, ends: tuple[float, float], reference: float, scale: float
 ) -> dict[str, float]:
     """Return the statistics of the distribution of heights reference + scale * values, from `_powers`."""
-    result = dict.fromkeys(HEIGHT_STATISTICS, math.nan)
-    (lowest, highest), (absolute, square, cube, fourth) = ends, (float(power) / size for power in powers)
-    variance = square
-    result["mean_height"] = reference + scale * mean
-    result["rms_height"] = scale * math.sqrt(variance)
-    result["mean_absolute_height"] = scale * absolute
-    result["peak_height"] = scale * (highest - mean)
-    result["valley_depth"] = scale * (mean - lowest)
-    result["peak_to_valley"] = scale * (highest - lowest)
+    (lowest, highest), (absolute, variance, cube, fourth) = ends, powers / size
+    result = {
+        "mean_height": reference + scale * mean,
+        "rms_height": scale * math.sqrt(variance),
+        "mean_absolute_height": scale * absolute,
+        "peak_height": scale * (highest - mean),
+        "valley_depth": scale * (mean - lowest),
+        "peak_to_valley": scale * (highest - lowest),
+    }
     if highest > lowest:
-        result["skewness"] = cube / variance**1.5
-        result["kurtosis"] = fourth / variance**2
+        result |= {"skewness": cube / variance**1.5, "kurtosis": fourth / variance**2}
     return result
 
 

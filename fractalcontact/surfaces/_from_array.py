@@ -292,10 +292,15 @@ def with_heights(surface: xr.DataArray, heights: Array) -> xr.DataArray:
     return result
 
 
-def labelled_rows(surface: xr.DataArray, rows: Sequence[Mapping[str, float]]) -> xr.Dataset:
-    """Return the quantities of each plane of a surface, a row each, over its leading dims."""
+def labelled_rows(
+    surface: xr.DataArray, rows: Sequence[Mapping[str, float]], names: Sequence[str]
+) -> xr.Dataset:
+    """Return the quantities of each plane of a surface, a row each, over its leading dims.
+
+    A quantity that a row has not is NaN.
+    """
     leading = surface.dims[: surface.ndim - len(core_dims(surface))]
     sizes = surface.shape[: len(leading)]
-    columns = {name: np.array([row[name] for row in rows]).reshape(sizes) for name in rows[0]}
+    columns = {name: np.array([row.get(name, np.nan) for row in rows]).reshape(sizes) for name in names}
     coords = leading_coords(surface, leading, (*columns, "run_time"))
     return xr.Dataset({name: (leading, values) for name, values in columns.items()}, coords)

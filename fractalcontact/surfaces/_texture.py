@@ -100,7 +100,7 @@ def texture(surface: xr.DataArray) -> xr.Dataset:
     stack = height_stack(surface)
     rows = [_correlation(heights, grid.spacing, grid.periodic) + _core(heights) for heights in stack]
     names = (*_CORRELATION, *_CORE)
-    result = labelled_rows(surface, [dict(zip(names, row, strict=True)) for row in rows])
+    result = labelled_rows(surface, [dict(zip(names, row, strict=True)) for row in rows], names)
     if len(grid.shape) == 1:
         result["texture_aspect_ratio"].attrs["reason"] = "a profile has one direction"
     return result
