@@ -263,43 +263,36 @@ def _fit(
     # of the dimension in a chosen window, which no scatter within one cluster shows: without it .959 of the
     # intervals hold (width .279), with half of it .985 (.301)
     between_clusters = 0.06
-    if by_regression:
-        regressions = [_scaling_fit.fit_regression(sizes, measure) for measure in curve.measure]
-        pairs = [(fit.dimension, 2.0 * fit.spread) for fit in regressions]
-        windows = [slice(0, sizes.size)] * planes.count
-        steady = curve
-    else:
+    windows, steady, mean = [slice(0, sizes.size)] * planes.count, curve, curve
+    if not by_regression:
         other = curve
         if cover != "aligned" and 2 * sizes.max() <= min(planes.sides):
             other = cover_curve(planes, sizes, "mean" if cover == "minimum" else "minimum")
         steady, mean = (other, curve) if cover == "mean" else (curve, other)
         quarters = np.array([_longest_edge(cells) / 4.0 for cells in planes.cells])
-        groups = [np.flatnonzero(planes.occupied > 0)] if one_for_all else [[k] for k in range(planes.count)]
-        windows = [slice(0, sizes.size)] * planes.count
-        for group in groups:
-            if len(group):
-                window = _scaling_fit.steadiest_window(
-                    sizes, steady.area[group], quarters[group].min(), planes.sides, limits[group].min()
-                )
-                windows = [window if k in group else other for k, other in enumerate(windows)]
-        pairs = []
-        for window, area, mean_area in zip(windows, steady.area, mean.area, strict=True):
-            if cover == "aligned":
-                fit = _scaling_fit.fit_steady_ratio(sizes[window], area[window])
-                half_width = _scaling_fit.deviations_of_95_percent(sizes[window]) * fit.spread
-                pairs.append((fit.dimension, half_width))
-            else:
-                pairs.append(fit_two_covers(sizes[window], area[window], mean_area[window], cover))
+        groups = [np.flatnonzero(planes.occupied > 0)] if one_for_all else np.arange(planes.count)[:, None]
+        for group in (group for group in groups if group.size):
+            window = _scaling_fit.steadiest_window(
+                sizes, steady.area[group], quarters[group].min(), planes.sides, limits[group].min()
+            )
+            windows = [window if k in group else own for k, own in enumerate(windows)]
     fits = []
-    for (value, half_width), window, area in zip(pairs, windows, steady.area, strict=True):
+    for window, area, mean_area, measure in zip(windows, steady.area, mean.area, curve.measure, strict=True):
         used = sizes[window]
+        if by_regression:
+            fit = _scaling_fit.fit_regression(sizes, measure)
+            value, half_width = fit.dimension, 2.0 * fit.spread
+        elif cover == "aligned":
+            fit = _scaling_fit.fit_steady_ratio(used, area[window])
+            value, half_width = fit.dimension, _scaling_fit.deviations_of_95_percent(used) * fit.spread
+        else:
+            value, half_width = fit_two_covers(used, area[window], mean_area[window], cover)
         slopes = _scaling_fit.ratio_slopes(used, area[window])
-        drift = (
-            0.0 if by_regression or window.start == 0 else _scaling_fit.drift_of(slopes) + between_clusters
-        )
+        if window.start > 0:
+            half_width += _scaling_fit.drift_of(slopes) + between_clusters
         has_spread = used.size > (2 if by_regression else 3)
         local = slopes[1] if slopes[1].size else np.array([np.nan])
-        width = half_width + drift + _scaling_fit.ROUNDING if has_spread else np.nan
+        width = half_width + _scaling_fit.ROUNDING if has_spread else np.nan
         fits.append(WindowFit(value, width, window, float(local.min()), float(local.max())))
     return fits
 
