@@ -13,7 +13,7 @@ from fractalcontact.base.regression import student_quantile
 from fractalcontact.base.results import public_result
 from fractalcontact.domains import _masks
 from fractalcontact.domains._lacunarity import BLOCKS
-from fractalcontact.domains._masks import Array, Planes
+from fractalcontact.domains._masks import Array, Planes, continued
 from fractalcontact.domains._scaling_fit import dimension_variables, interval_notes, window_notes
 
 SOURCE = "Falconer, Fractal Geometry (1990), ch. 3; Bale and Schmidt, Phys. Rev. Lett. 53:596 (1984)"
@@ -101,11 +101,8 @@ def count_pairs(cells: Array, valid: Array | None, grid: Grid) -> tuple[Array, A
     """Return observed pairs and differing pairs, (blocks, offsets)."""
     shape = (BLOCKS, BLOCKS, len(OFFSETS))
     pairs, differing = np.zeros(shape, np.int64), np.zeros(shape, np.int64)
-    # beyond a free edge nothing was observed
-    around = np.ones_like(cells) if valid is None else valid
-    for axis, wraps in enumerate(grid.periodic):
-        widths = [(REACH if own == axis else 0,) * 2 for own in (0, 1)]
-        cells, around = (np.pad(each, widths, "wrap" if wraps else "constant") for each in (cells, around))
+    observed = np.ones_like(cells) if valid is None else valid
+    cells, around = (continued(each, REACH, grid.periodic) for each in (cells, observed))
     count_differing_pairs(cells, around, OFFSETS, pairs, differing)
     return pairs.reshape(-1, len(OFFSETS)), differing.reshape(-1, len(OFFSETS))
 
@@ -140,22 +137,13 @@ def has_interiors(cells: Array, valid: Array | None, dimension: float, *, grid: 
 
 def cells_in_blocks(cells: Array, edge: int, periodic: Sequence[bool]) -> Array:
     """Mark the cells that lie in a block of `edge` x `edge` cells of the set (the opening by a square)."""
-    none = np.zeros_like(cells)
-    for axis, wraps in enumerate(periodic):
-        if wraps:
-            widths = [(0, 0), (0, 0)]
-            widths[axis] = (edge - 1, edge - 1)
-            cells = np.pad(cells, widths, mode="wrap")
-    if min(cells.shape) < edge:
-        return none
-    corners = cells
+    blocks = continued(cells, edge - 1, periodic)
     for axis in (0, 1):
-        corners = _combined(np.bitwise_and, corners, edge, axis)
-    marked = np.pad(corners, edge - 1)
+        blocks = _combined(np.bitwise_and, blocks, edge, axis)
+    marked = np.pad(blocks, edge - 1)
     for axis in (0, 1):
         marked = _combined(np.bitwise_or, marked, edge, axis)
-    rows, columns = (slice(edge - 1, 1 - edge) if wraps else slice(None) for wraps in periodic)
-    return marked[rows, columns]
+    return marked[edge - 1 : 1 - edge, edge - 1 : 1 - edge]
 
 
 def _combined(operation: np.ufunc, cells: Array, length: int, axis: int) -> Array:

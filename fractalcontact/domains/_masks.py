@@ -7,7 +7,7 @@ mask. A profile is a plane of one row with the rank 1: what depends on the rank 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -328,6 +328,17 @@ def _flags(mask: xr.DataArray) -> Array:
         return flags
     values = np.ascontiguousarray(mask.values)
     return values if values.dtype.kind == "b" else np.asarray(values > 0)
+
+
+def continued(cells: Array, reach: int, periodic: Sequence[bool]) -> Array:
+    """Return a plane with so many cells more beyond each edge: its own around a period, else none."""
+    around = np.pad(cells, reach)
+    for axis, (n, wraps) in enumerate(zip(cells.shape, periodic, strict=True)):
+        if wraps:
+            beyond = np.append(np.arange(-reach, 0), n + np.arange(reach))
+            lines = np.moveaxis(around, axis, 0)
+            lines[reach + beyond] = lines[reach + beyond % n]
+    return around
 
 
 def _row_coords(planes: Planes, row: str, plane: Array) -> dict[str, Any]:
