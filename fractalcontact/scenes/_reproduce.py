@@ -72,10 +72,7 @@ def reproduce(
         if problems.require(is_result, "result", expected, type(result).__name__) and is_path:
             entry = provenance_of(result)
             count = provenance.member_count(entry)
-            if count is None:
-                problems.integer("member", member, at_least=0, at_most=0, optional=True)
-            else:
-                problems.integer("member", member, at_least=0, at_most=count - 1)
+            problems.integer("member", member, at_least=0, at_most=(count or 1) - 1, optional=count is None)
     source = _Source(Path(folder))
     if count is not None and member is not None:
         entry = provenance.member_entry(entry, member)

@@ -396,13 +396,8 @@ def _by_number(result: xr.Dataset, dim: Hashable) -> xr.Dataset:
     """Return a result over the numbers of the values along a dim; the values are a further coordinate."""
     if dim not in result.dims:
         return result
-    number = f"{dim}_number"
-    if dim not in result.coords:
-        return result.rename_dims({dim: number})
-    flat = result.drop_indexes(
-        [name for name, coord in result.coords.items() if name in result.xindexes and coord.dims == (dim,)]
-    )
-    return flat.rename_dims({dim: number}).assign_attrs(result.attrs)
+    labels = [name for name in result.xindexes if result.coords[name].dims == (dim,)]
+    return result.drop_indexes(labels).rename_dims({dim: f"{dim}_number"}).assign_attrs(result.attrs)
 
 
 def _reindexed(result: xr.Dataset, dim: Hashable, values: list[Any]) -> xr.Dataset:
@@ -410,15 +405,9 @@ def _reindexed(result: xr.Dataset, dim: Hashable, values: list[Any]) -> xr.Datas
         return result
     has_coord = dim in result.coords
     indexed = result if has_coord else result.assign_coords({dim: result.get_index(dim)})
-    blank = {
-        name: BLANK[variable.dtype.kind]
-        for name, variable in result.variables.items()
-        if variable.dtype.kind in BLANK and name != dim
-    }
-    full = indexed.reindex(
-        {dim: values},
-        fill_value=blank | dict.fromkeys(result.variables.keys() - blank.keys() - {dim}, np.nan),
-    )
+    kinds = {name: each.dtype.kind for name, each in result.variables.items() if name != dim}
+    fill = {name: BLANK.get(kind, np.nan) for name, kind in kinds.items()}
+    full = indexed.reindex({dim: values}, fill_value=fill)
     return full if has_coord else full.drop_vars([dim])
 
 
@@ -426,10 +415,8 @@ def _own_coords(results: Sequence[xr.Dataset]) -> set[Hashable]:
     """Return the coordinates that each result has for itself: loads, and all that differ."""
     own = {name for result in results for name, coord in result.coords.items() if "step" in coord.dims}
     for name, first in results[0].coords.items():
-        others = (result.coords.get(name) for result in results[1:])
-        if first.dims and any(
-            other is not None and not first.variable.equals(other.variable) for other in others
-        ):
+        others = (result.coords[name].variable for result in results[1:] if name in result.coords)
+        if first.dims and not all(map(first.variable.equals, others)):
             own.add(name)
     return {name for name in own if name not in (*results[0].dims, *RAGGED)}
 
