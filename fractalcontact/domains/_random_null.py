@@ -238,13 +238,10 @@ class NullBoxes:
     """The boxes of a cover on one plane, whatever the cells of the null: contents by size, and pairs."""
 
     def __init__(self, planes: Planes, plane: int, sizes: Array, cover: str) -> None:
-        self.sides, self.is_aligned, self.has_gaps = (
-            planes.sides,
-            cover == "aligned",
-            planes.valid is not None,
-        )
+        self.sides, self.has_gaps, is_aligned = planes.sides, planes.valid is not None, cover == "aligned"
+        self.of_full_boxes = not (is_aligned or self.has_gaps)  # at free edges boxes at any place are cut
         longest = max(1, min(planes.sides) // 2)
-        along = cache(aligned if self.is_aligned else any_place)
+        along = cache(aligned if is_aligned else any_place)
 
         def on_all_axes(first: int, second: int) -> Pairs:
             axes = [along(n, first, second) for n in self.sides]
@@ -258,7 +255,7 @@ class NullBoxes:
             valid, observed = planes.valid[plane], int(planes.observed[plane])
             contents = _contents_in_gaps(valid, planes.periodic, observed, sizes, longest)
             in_gaps = PairsInGaps(valid, planes.rank, int(sizes.max(initial=1)))
-            self.pairs = cache(in_gaps.aligned if self.is_aligned else in_gaps.any_place)
+            self.pairs = cache(in_gaps.aligned if is_aligned else in_gaps.any_place)
         self.contents = dict(zip(sizes.tolist(), contents, strict=True))
 
     def expected_counts(self, null: RandomCells, sizes: Array) -> Array:
@@ -280,7 +277,7 @@ class NullBoxes:
         covariance = np.zeros((sizes.size, sizes.size))
         for i, first in enumerate(sizes.tolist()):
             for j, second in enumerate(sizes[: i + 1].tolist()):
-                if not (self.is_aligned or self.has_gaps or (scatters[i] and scatters[j])):
+                if self.of_full_boxes and not (scatters[i] and scatters[j]):
                     continue
                 a, b, shared, number = self.pairs(first, second)
                 value = np.sum(number * null.both_empty(a, b, shared))
@@ -289,7 +286,7 @@ class NullBoxes:
                     value -= null.coupling * (sums[i] * sums[j] - overlapping)
                 covariance[i, j] = covariance[j, i] = value
         scale = np.array([of.measure / of.boxes for of in contents])
-        if not (self.is_aligned or self.has_gaps):
+        if self.of_full_boxes:
             for i, (of, area) in enumerate(zip(contents, areas, strict=True)):
                 full = null.share_variance(replace(of, cells=np.array([area]), share=np.ones(1)))
                 scale[i] = np.sqrt(null.share_variance(of) / full) if full > 0.0 else 1.0
