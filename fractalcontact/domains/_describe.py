@@ -99,10 +99,25 @@ def describe(
     planes = read_planes(mask, valid=valid, periodic=periodic)
     components = label_planes(planes, connectivity, keep=False)
     wanted = DESCRIBED if planes.rank == 2 else DESCRIBED_OF_PROFILES
-    result = measure_planes(planes, wanted, components, connectivity)
+    results = [measure_planes(planes, wanted, components, connectivity)]
     if planes.rank == 2:
-        result.update(_signature.analyse(planes, components))
+        results.append(_signature.analyse(planes, components))
+    result = updated(results)
     return result.drop_dims([dim for dim in CURVES if dim in result.dims])
+
+
+def updated(results: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return one dataset of several results of the same planes; of variables of one name the last."""
+    result, *others = _without_own_names(results)
+    for other in others:
+        result.update(other)
+    return result
+
+
+def _without_own_names(results: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return results without the coordinates of the mask that are called as a variable of one of them."""
+    names = {name for each in results for name in each.data_vars}
+    return [each.drop_vars(names & set(each.coords)) for each in results]
 
 
 def measure_planes(
@@ -122,7 +137,8 @@ def measure_planes(
     sizes = [each["box_size"].values for each in analyses if "box_size" in each.coords]
     if sizes:  # those of every analysis come first, as their lengths would have gaps
         results.append(planes.dataset({}, planes.box_coords(np.unique(np.concatenate(sizes)))))
-    result = xr.merge([*results, *analyses], join="outer", compat="override", combine_attrs="override")
+    results = _without_own_names([*results, *analyses])
+    result = xr.merge(results, join="outer", compat="override", combine_attrs="override")
     for name, variable in ((name, each.variables[name]) for each in analyses for name in each.data_vars):
         if variable.sizes.get("box_size", np.inf) < result.sizes.get("box_size", 0):
             own = f"; {REASONS[name]}" if name in REASONS and np.isnan(variable.values).any() else ""

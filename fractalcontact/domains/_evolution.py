@@ -22,7 +22,7 @@ from fractalcontact.base.study import joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.domains import _masks, _signature
 from fractalcontact.domains._connected_components import Components, check_connected, label_planes
-from fractalcontact.domains._describe import MEASURES, measure_planes, sources
+from fractalcontact.domains._describe import MEASURES, measure_planes, sources, updated
 from fractalcontact.domains._masks import Array, Planes, check_window, read_planes
 
 SOURCE = joined_references(_signature.SOURCE, "Hausdorff, Mengenlehre (1927)")
@@ -125,9 +125,9 @@ def evolution(
     result = measure_planes(planes, wanted, components, connectivity)
     if signature is None:
         signature = _signature.analyse(planes, components, window=window, along=along)
-    result.update(signature.drop_vars("run_time", errors="ignore"))
-    result.update(_changes(planes, components, path, signature["spot_size"].values.reshape(-1)))
-    result.update(_returns(planes, path))
+    signature = signature.drop_vars("run_time", errors="ignore")
+    changes = _changes(planes, components, path, signature["spot_size"].values.reshape(-1))
+    result = updated([result, signature, changes, _returns(planes, path)])
     return result.assign_attrs(references=joined_references(SOURCE, *([sources(wanted)] if wanted else [])))
 
 
