@@ -40,6 +40,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     DEPARTURE,
     HURST,
     NOISE,
+    RATIO,
     SPREAD,
     Known,
     Posterior,
@@ -60,9 +61,6 @@ _TAPERED = 0.05  # share of an edge over which the taper rises
 _LEAK = 0.25  # power of the edges over that of a mode, either way, from which on neighbours are correlated
 _EMPTY = 1e-14  # of the largest level: rounding
 _CUT_OFF = 1e-4  # power of a ring over that an octave before; a blur of a spacing has 4e-5
-# Prior deviation of u and v, log 2: 95 % of ratios are below 5.5. Without a prior the azimuths of a few long
-# waves of white noise make a blurred lay as probable as the noise (3 of 4 surfaces)
-_PRIOR_LOG_RATIO = math.log(2.0)
 _POSSIBLE = 1e-3  # probability of a hypothesis whose azimuths are looked at
 _ROUNDS = 12  # of a fit, 1 to 6 of which were needed; 64 x 64 points under a lay of 8 to 1 may not settle
 IMPROBABLE = 1e-3  # p value below which no anisotropy ratio describes the surface
@@ -265,7 +263,8 @@ class Classes:
         """Return the spectrum with the log ratio by Fisher scoring, its covariance, and -2 log evidence.
 
         The evidence is that of the classes about the mean of their ring, over the prior of the log ratio. A
-        lay is there with the probability of a departure, and its log ratio is normal; without one it is zero.
+        lay is there with the probability of a departure, u and v are normal; without one they are zero. With
+        no prior the azimuths of a few long waves of white noise make a blurred lay as probable as noise.
         """
         weight = self.count * self.information
         for _ in range(_ROUNDS):
@@ -281,7 +280,7 @@ class Classes:
                 break
         excess = self.excess(self.relative(spectrum))
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
-        over = np.eye(2) + _PRIOR_LOG_RATIO**2 * information
+        over = np.eye(2) + RATIO**2 * information
         turned = uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
         isotropic = uv @ information @ uv  # by so much the deviance is higher without a lay
         logs = math.log(DEPARTURE) - 0.5 * turned, math.log(1.0 - DEPARTURE) - 0.5 * isotropic

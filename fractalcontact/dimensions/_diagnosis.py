@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.dimensions._surface_input import Surface
+from fractalcontact.dimensions._mode_bins import LEAST
+from fractalcontact.dimensions._surface_input import A_TENTH, Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -65,14 +66,15 @@ def rounding_step(surface: Surface, *, rows: int = 16, sample: int = 4096, toler
     lines = surface.heights[:: max(1, surface.shape[0] // rows)]
     bends = np.diff(lines[:, :: -(-lines.size // sample)], 2, axis=1)
     observed = bends[np.isfinite(bends)]
-    rounding = 64.0 * np.spacing(float(np.nanmax(np.abs(lines), initial=0.0)))  # of the numbers themselves
+    # of the numbers themselves: many files hold single precision
+    rounding = 8.0 * float(np.finfo(np.float32).eps * np.nanmax(np.abs(lines), initial=0.0))
     levels = np.unique(observed)
     levels = levels[np.diff(levels, prepend=-np.inf) > rounding]
     if observed.size < 8 or levels.size < 2:
         return 0.0
     gaps = np.diff(levels)
     step = float(gaps[gaps > tolerance * np.median(gaps)].min())
-    multiples = (levels - levels[0]) / step
+    multiples = (observed - levels[0]) / step
     return step if np.abs(multiples - np.rint(multiples)).max() <= tolerance else 0.0
 
 
@@ -122,12 +124,12 @@ def _squared_bends(heights: Array, rows: int = 32) -> Iterator[Array]:
         yield np.square(bends, out=bends)
 
 
-def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0, least_share: float = 0.1) -> str:
+def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0) -> str:
     """Look for squared differences beyond those of a Gaussian surface.
 
     The quantile of a sample of this `size` scatters by .2 %. `spike`: standard deviations; 1e8 Gaussian
-    second differences reach 5.7, a scanned rock face 15. `least_share`: share of their squares below which
-    noise and misfit describe them.
+    second differences reach 5.7, scanned rock faces 39. With less than `A_TENTH` of the squares noise and
+    misfit describe them.
     """
     step = -(-heights.size // size)
     sample = np.concatenate([squares.ravel()[::step] for squares in _squared_bends(heights)])
@@ -140,7 +142,7 @@ def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0, least_shar
     for squares in _squared_bends(heights):
         high = squares[squares > spike**2 * typical]
         number, above, total = number + high.size, above + high.sum(), total + np.nansum(squares)
-    if typical == 0.0 or above < least_share * total:
+    if typical == 0.0 or above < A_TENTH * total:
         return ""
     return (
         f"{number} heights stand out of their neighbours by more than {spike:.0f} standard deviations: "
@@ -175,11 +177,11 @@ def _seams(heights: Array, step: float, points: int = 512) -> str:
     return ""
 
 
-def _missing_extremes(heights: Array, edge: int = 15, fewest: int = 12) -> str:
+def _missing_extremes(heights: Array, edge: int = 15) -> str:
     """Look for gaps whose neighbours lie to one side of their surroundings: valleys or peaks are missing.
 
-    `edge`: points along an edge of the surroundings. `fewest`: gaps; the scatter of their means is then known
-    to a fifth.
+    `edge`: points along an edge of the surroundings. Of `LEAST` gaps the scatter of their means is known to a
+    quarter.
     """
     from scipy.ndimage import grey_dilation, label, mean, uniform_filter
 
@@ -192,7 +194,7 @@ def _missing_extremes(heights: Array, edge: int = 15, fewest: int = 12) -> str:
         is_inner[border] = False
     owner = np.where(observed, grey_dilation(np.where(is_inner[gaps], gaps, 0), (3, 3)), 0)
     numbers = np.unique(owner)[1:]
-    if numbers.size < fewest:
+    if numbers.size < LEAST:
         return ""
     around = uniform_filter(np.where(observed, heights, 0.0), edge)
     around /= np.maximum(uniform_filter(observed.astype(float), edge), 1e-6)

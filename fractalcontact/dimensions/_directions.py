@@ -23,7 +23,7 @@ from fractalcontact.dimensions._azimuths import (
     fit_azimuths,
 )
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
-from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST, likelihood
+from fractalcontact.dimensions._likelihood import NO_MODES, likelihood
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, squared_length
 from fractalcontact.dimensions._mode_fit import first_fit
 from fractalcontact.dimensions._records import CONSTANT, NORMAL, Estimate, joined, plane, smooth, undefined
@@ -306,7 +306,4 @@ def _along(fit: AzimuthFit, azimuth: float, along: Array, every: Array, unit: fl
     lag = float(squared_length(fit.spectrum.metric, np.sin(angle), np.cos(angle)))
     increment = float(np.sqrt(np.exp(along[0]) * lag**hurst))
     estimate = Estimate(hurst, (high - low) / (2.0 * NORMAL), low, high, rms_increment=increment * unit)
-    if not reason and high - low > WIDEST:
-        ends = f"{max(low, 0.0):.2f} to {min(high, 1.0):.2f}"
-        reason = f"the heights do not determine the exponent: {ends} is as likely"
     return estimate.without_interval(reason) if reason else estimate

@@ -30,7 +30,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._diagnosis import resampling, rounding_noise
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
-from fractalcontact.dimensions._likelihood import NO_MODES, WIDEST
+from fractalcontact.dimensions._likelihood import NO_MODES
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
@@ -223,9 +223,7 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     shares, centres, deviations = model.components(*levels, windows.new_share)
     for place, centre, deviation in zip(chosen, centres, deviations, strict=True):
         low, hurst, high, error = mixture_interval(shares, centre, deviation)
-        record = Estimate(hurst, error, low, high)
-        wide = f"the heights of a window do not determine its exponent: {low:.2f} to {high:.2f} is as likely"
-        records[place] = record.without_interval(wide) if high - low > WIDEST else record
+        records[place] = Estimate(hurst, error, low, high)
     return [record or undefined(NO_MODES) for record in records]
 
 

@@ -28,6 +28,7 @@ from fractalcontact.dimensions._mode_fit import NEAR_ISOTROPY, FirstFit, first_f
 from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     CORNER,
+    LEVEL,
     LONG_HURST,
     NOISE,
     SPREAD,
@@ -47,8 +48,6 @@ _PERIODIC_GAPS = (
 NO_MODES = (
     "too few modes that vary along both axes: give more points, or a profile where heights vary along one"
 )
-WIDEST = 0.85  # width of an interval that says nothing: the prior has .95
-_SEEN = 0.8  # probability from which on a nuisance is named
 
 
 def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float | None = None) -> Estimate:
@@ -119,8 +118,8 @@ def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, k
     dx, unit = surface.spacing[1], first.scale * surface.unit
     inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx
     amplitude = math.sqrt(max(_amplitude(bins, found), 0.0))
-    is_noisy = known.noise is None and found.probability("is_noisy") > _SEEN
-    is_blurred = known.spread is None and found.probability("is_blurred") > _SEEN
+    is_noisy = known.noise is None and found.probability("is_noisy") > LEVEL
+    is_blurred = known.spread is None and found.probability("is_blurred") > LEVEL
     spread = found.mean(SPREAD, "is_blurred") * dx if is_blurred else math.nan
     height = amplitude * unit * found.mean(NOISE, "is_noisy") if is_noisy else math.nan
     estimate = Estimate(
@@ -141,8 +140,6 @@ def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, k
     reason = diagnose(surface, is_window=known.is_window)
     if any(surface.grid.periodic) and not first.lattice.periodic:
         reason = _PERIODIC_GAPS
-    if not reason and high - low > WIDEST:
-        reason = f"the heights do not determine the exponent: {low:.2f} to {high:.2f} is as likely"
     return estimate if not reason else estimate.without_interval(reason)
 
 
@@ -154,7 +151,7 @@ def _findings(found: Posterior, bins: Bins, dx: float, spread: float, height: fl
         notes.append(f"blur with a spread of {quantity_text(spread, 'm')}")
     if np.isfinite(height):
         notes.append(f"white noise with an rms height of {quantity_text(height, 'm')}")
-    if theta[CORNER] > 0.0 and found.probability("is_bent") > _SEEN:
+    if theta[CORNER] > 0.0 and found.probability("is_bent") > LEVEL:
         length = quantity_text(2.0 * np.pi / theta[CORNER] * dx, "m")
         notes.append(f"waves longer than about {length} have another exponent, {theta[LONG_HURST]:.2f}")
     if not discrepancy.inside.all():

@@ -21,7 +21,14 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
-from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, spread_nodes, weights
+from fractalcontact.dimensions._gaussian_mixture import (
+    CLEAR_WAVELENGTH,
+    FORMS,
+    Bins,
+    Lattice,
+    spread_nodes,
+    weights,
+)
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -179,16 +186,11 @@ def lay(lattice: Lattice, levels: Levels) -> Array | float:
     return np.asarray(np.exp(share * levels.level)[_sectors(y[:, None], x)])
 
 
-def levels_by_azimuth(
-    lattice: Lattice, ratio: Array, keep: Array, isotropic: float = math.pi / 3.0
-) -> Levels:
-    """Return the levels of some modes; `ratio` is their power over that expected.
-
-    Up to `isotropic` radians per point aliases differ by less than 5 % for H above .1.
-    """
+def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
+    """Return the levels of some modes; `ratio` is their power over that expected."""
     y, x = lattice.wavenumbers
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
-    limit = isotropic / max(lattice.spacing)
+    limit = 2.0 * math.pi / (CLEAR_WAVELENGTH * max(lattice.spacing))
     near_y, near_x = (np.flatnonzero(np.abs(along) < limit) for along in (y, x))
     is_near = np.hypot(y[near_y, None], x[near_x]) < limit
     rows, columns = np.nonzero(keep[np.ix_(near_y, near_x)] & is_near)

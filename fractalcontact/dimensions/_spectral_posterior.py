@@ -38,29 +38,32 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fractalcontact.dimensions._gaussian_mixture import FILTERED, FORMS, UNALIASED, Bins
+from fractalcontact.dimensions._gaussian_mixture import CLEAR_WAVELENGTH, FILTERED, FORMS, UNALIASED, Bins
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
-LOWEST, HIGHEST = 0.005, 0.995  # H
+LOWEST, HIGHEST = 0.005, 0.995  # H: at 0 and 1 no sum of Gaussians has increments
+LEVEL = 0.95  # probability of an interval, and from which on a nuisance is named
 
 # Priors. Probability of each departure from an exact surface: blur, corner, no aliases, process, cut.
 # Intervals of 10800 surfaces of 33 kinds, 128 x 128 points, hold H in .960, .968, .973, .978 and .984 with
 # .06, .08, .1, .12 and .15 (noise alike); fewer than .9 in 14, 12, 9, 6 and 5 of 96 cells; widths .85 to 1
 DEPARTURE = 0.1
-# Of noise, which any instrument adds. Where it is just not seen intervals hold H in .70, .80, .87 and .93
-# with .1, .2, .3 and .5 (noise of .05, H = .9, 256 x 256 points), .47 .70 .72 .72 (.2, .5, 128 x 128); those
-# of exact surfaces, 128 x 128, are 2 to 11, 5 to 20 and 9 to 34 % wider than with .1
+# Of noise, which any instrument adds. Where it is just not seen intervals hold H in .70, .78, .85 and .93
+# with .1, .2, .3 and .5 (noise of .05, H = .9, 256 x 256 points); those of exact surfaces, 128 x 128, are 2
+# to 9 and 6 to 19 % wider with .3 and .5 than with .2. With .3 `directions` gives white noise H = .5
 _NOISY = 0.2
+# Deviation of the logarithm of a positive number of which nothing else is known: a factor of e
+_ANY = 1.0
 # Normal in ln nu (of the rms increment), ln s (spacings) and ln k. 95 % of instruments add noise of 1 to
 # 50 %: with a median of .05 the intervals of `directions` missed H = .7 in one of six surfaces with noise of
-# .3, with .1 exact intervals of H = .5 are 1.1 times as wide. 95 % of k are .25 to 4: with a factor of e in
-# place of 2 white noise is taken for a wide bend
-_PRIOR_NOISE, _PRIOR_SPREAD, _PRIOR_SHARPNESS = (math.log(0.07), 1.0), (0.0, 1.0), (0.0, 0.7)
-_LONG_HURSTS = -1.5, 1.2  # a Gaussian high-pass filter, a plateau (-1), any other self-affine surface
-_SHORTEST_CORNER = 4.0  # spacings: two bins of waves beyond it show H
-_TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor
+# .3, with .1 exact intervals of H = .5 are 1.1 times as wide. 95 % of ratios, as k and those of lengths, are
+# 1 / 4 to 4: with a factor of e in place of 2 white noise is taken for a wide bend
+RATIO = math.log(2.0)
+_PRIOR_NOISE, _PRIOR_SPREAD, _PRIOR_SHARPNESS = (math.log(0.07), _ANY), (0.0, _ANY), (0.0, RATIO)
+_LONG_HURSTS = -1.0, 1.0  # from a plateau to heights without a fractal dimension
+_TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor; the last one at a cut
 _OCTAVE = math.log(2.0)
 
 
@@ -248,7 +251,7 @@ def joint_interval(posteriors: Sequence[Posterior], *, points: int = 4001, zooms
     return _shortest(u, below / below[-1])
 
 
-def _shortest(u: Array, below: Array, probability: float = 0.95) -> Interval:
+def _shortest(u: Array, below: Array, probability: float = LEVEL) -> Interval:
     """Return the shortest interval of H with the probability; `below` is that of less than u.
 
     A parabola through three starts lets the ends move evenly.
@@ -324,7 +327,7 @@ def posterior(
         kinds = [kind for kind in kinds if kind.inside.all()]
     if is_pilot:
         kinds = [kind for kind in kinds if kind.inside[0] and kind.scatter[0] in (0.0, _TAUS[2])]
-    corners = math.log(0.5 * np.pi / bins.extent), math.log(2.0 * np.pi / _SHORTEST_CORNER)
+    corners = math.log(0.5 * np.pi / bins.extent), math.log(2.0 * np.pi / CLEAR_WAVELENGTH)
     ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, _PRIOR_SHARPNESS
     prior = np.array(ranges).T
     whitening, constants = map(np.stack, zip(*(_whitening(kind, bins) for kind in kinds), strict=True))
@@ -368,9 +371,7 @@ def _discrepancies(
     bins: Bins,
     pilot_spread: float,
     *,
-    at_cut: float = 0.5,
-    least_octaves: float = 2.5,
-    most_octaves: float = 3.5,
+    room: float = 3.0,
     fourth_order: float = 0.125,
 ) -> list[Discrepancy]:
     """Return the kinds of discrepancy with their prior probabilities, which sum to one.
@@ -379,26 +380,22 @@ def _discrepancies(
     ----------
     bins : Bins
     pilot_spread : float
-    at_cut : float
-        Standard deviation of the logarithm of the power at a cut.
-    least_octaves : float
-        Octaves between cuts, to tell an exponent from a corner.
-    most_octaves : float
-        Octaves beyond a cut: filters of up to ten points, a levelled tenth of the extent.
+    room : float
+        Octaves that a cut leaves, to tell an exponent from a corner, and that are at most beyond it: filters
+        of up to eight points, a levelled eighth of the extent.
     fourth_order : float
         Of (s q)^4: that of a mean over three points.
     """
     octaves = bins.lnq / _OCTAVE
     everything = np.ones(octaves.size, dtype=bool)
     lowest, highest = float(octaves.min()), float(octaves.max())
-    cuts: list[tuple[Array, Array]] = []
     # between rings of bins; those of one ring differ by less than a tenth of an octave
     ends = np.sort(octaves)
     ends = ends[np.flatnonzero(np.diff(ends) > 0.1)]
-    short_cuts = ends[ends > max(lowest + least_octaves, highest - most_octaves)]
-    cuts += [(at_cut * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
-    for cut in ends[ends < min(highest - least_octaves, lowest + most_octaves)][::2]:
-        cuts.append((at_cut * 4.0 ** (cut - octaves), octaves > cut))
+    short_cuts = ends[ends > max(lowest + room, highest - room)]
+    long_cuts = ends[ends < min(highest - room, lowest + room)][::2]
+    cuts = [(_TAUS[-1] * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
+    cuts += [(_TAUS[-1] * 4.0 ** (cut - octaves), octaves > cut) for cut in long_cuts]
     cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
     fourth = fourth_order * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
     has_fourth = bool(fourth.max() > 0.01)
@@ -417,7 +414,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e3) -> tuple[Array,
     """Return the matrix that makes the bins of (2) white, zero for those that do not count, and its log
     density.
 
-    A bin beyond a cut has the expected logarithm of the density of a deviation of a factor of e. `flat` is
+    A bin beyond a cut has the expected logarithm of the density of the deviation `_ANY`. `flat` is
     the variance of ln A: two deviations are a factor of e^63. Known noise determines A.
     """
     octaves = bins.lnq / _OCTAVE
@@ -428,7 +425,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e3) -> tuple[Array,
     whitening = np.zeros(covariance.shape)
     # above the diagonal the library leaves zeros or rounding, in one process not as in another
     whitening[inside] = np.tril(np.linalg.inv(lower))
-    outside = bins.variance[~kind.inside] + 1.0
+    outside = bins.variance[~kind.inside] + _ANY**2
     density = -np.log(np.diag(lower)).sum() - 0.5 * np.sum(np.log(outside) + 1.0)
     return whitening, math.log(kind.prior) + float(density)
 

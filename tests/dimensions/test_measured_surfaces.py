@@ -121,6 +121,18 @@ def test_rounded_heights_have_no_seams(hurst):
     assert sum(held) >= 4
 
 
+@pytest.mark.parametrize("hurst", [0.3, 0.6])
+def test_rounding_is_seen_in_single_precision(hurst):
+    """As many files hold it. Unseen, it moved H = .3 by .03 and made seams of tiles."""
+    heights = STEP * np.rint(brownian(hurst, 1))
+    results = [
+        fc.dimensions.estimate(fc.surfaces.from_array(heights.astype(precision), SPACING)).isel(method=0)
+        for precision in (np.float32, np.float64)
+    ]
+    for name in ("hurst", "ci_low", "ci_high"):
+        assert float(results[0][name]) == pytest.approx(float(results[1][name]), abs=1e-3)
+
+
 def test_what_is_found_is_named():
     blurred = estimated(inner(gaussian_filter(brownian(0.6, 3, margin=MARGIN), 1.5)))
     assert float(blurred.blur_spread) == pytest.approx(1.5 * SPACING, rel=0.15)

@@ -250,15 +250,17 @@ def test_without_the_finest_scale_the_dimension_is_wrong():
     np.testing.assert_array_less(0.99 * float(surface.finest_scale), resolved.scale_min)
 
 
-def test_directions_of_a_fine_grid_have_no_interval_of_its_own_waves():
+def test_directions_of_a_fine_grid_are_those_of_its_points():
     """Few waves of an isotropic cloud are resolved by its points; those of the gridding do not count."""
     surface = fc.surfaces.from_points(measured_points("random", 0.5, 5), 2e-4, plane="xy")
     resolved = fc.dimensions.directions(surface)
     every = fc.dimensions.directions(surface.drop_vars("finest_scale"))
-    for result, words in ((resolved, "do not determine"), (every, "on lines between")):
+    for result in (resolved, every):
         assert float(result["isotropy_p_value"]) > 0.01
-        assert np.isnan(result["ci_low"]).all()
-        assert words in result["ci_low"].attrs["reason"]
+    assert ((resolved["ci_low"] < 0.5) & (resolved["ci_high"] > 0.5)).all()
+    assert (resolved["ci_high"] - resolved["ci_low"]).min() > 0.5
+    assert np.isnan(every["ci_low"]).all()
+    assert "on lines between" in every["ci_low"].attrs["reason"]
 
 
 @pytest.mark.parametrize(
