@@ -239,6 +239,10 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         form = table["generate"] if is_known else ""
     if form:
         _check_table(table, forms[form], name, problems)
+    else:  # all keys have a meaning that one of the forms gives them
+        kinds = {key: kind for each in forms.values() for key, kind in each.kinds.items()}
+        known = {key: value for key, value in table.items() if key in kinds}
+        _check_table(known, Keys(kinds), name, problems)
 
 
 def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> None:

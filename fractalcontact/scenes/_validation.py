@@ -28,8 +28,8 @@ from fractalcontact.scenes import _inputs
 from fractalcontact.scenes._scene import LOADS, Scene, SurfaceTable
 from fractalcontact.scenes._scene_file import check_tables, parse, scans_of
 from fractalcontact.scenes._scene_keys import GENERATORS
-from fractalcontact.scenes._stage_type import StageType, parameters_of, public_function
-from fractalcontact.scenes._stages import STAGES, stages_of
+from fractalcontact.scenes._stage_type import StageType, arguments_of, parameters_of, public_function
+from fractalcontact.scenes._stages import STAGES, WANTED, stages_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,9 +85,10 @@ def validated(scene: Scene | str | os.PathLike[str]) -> tuple[Scene, dict[str, x
         if not _is_valid(problems, "material"):
             known = {key: table for key, table in scene.tables.items() if key != "material"}
             scene = replace(scene, tables=known)
+        if not _is_valid(problems, "want"):
+            scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
-        if _is_valid(problems, "want"):  # or nothing says which calls there are
-            _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
+        _validate_calls(scene, surfaces, _valid_crack(scene, surfaces, problems), problems)
     warn_of_input(scene, surfaces["surface"])
     return scene, {name: face for name, face in surfaces.items() if "generate" not in scene.table(name)}
 
@@ -142,6 +143,23 @@ def _collected(
                 problems.note(f"{tables[0] or place}.{argument}", f"{place}: {line}")
 
 
+def _with_possible_want(scene: Scene) -> Scene:
+    """Return a scene that wants what its tables are for, in place of words that were refused.
+
+    Otherwise a wrong word would hide the problems of the calls.
+    """
+    want = {name: [word for word in scene.wanted(name) if word in words] for name, words in WANTED.items()}
+    for row in STAGES.values():
+        name, _, word = row.table.partition(".")
+        if row.table and row.wanted and (word in scene.table(name) if word else name in scene.tables):
+            group, _, asked = row.wanted.partition(".")
+            want[group].append(asked)
+    if "dimensions" in scene.tables:
+        want["dimensions"] = ["default"]
+    possible = {name: list(dict.fromkeys(words)) for name, words in want.items() if words}
+    return replace(scene, tables={**scene.tables, "want": possible})
+
+
 def _is_valid(problems: Problems, *keys: str) -> bool:
     """Return whether these keys of the scene, with their tables and sub-tables, passed the checks so far."""
     pairs = [(f"{key}.", f"{failed}.") for key in keys for failed in problems.arguments]
@@ -154,9 +172,9 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
     for name, table in (("surface", scene.surface), ("upper", scene.upper)):
         if table is None:
             continue
-        if table.generate in GENERATORS:
+        if generator := _generator(table):
             with _collected(problems, name, name):
-                _validate_call(f"surfaces.{table.generate}", **_inputs.generator_options(table))
+                _validate_call(f"surfaces.{generator}", **_inputs.generator_options(table))
         if _is_valid(problems, name) and (name == "surface" or scene.want.joints):
             with problems.collect(f"{name}: "):
                 flat = _flat_surface(table)
@@ -175,6 +193,14 @@ def require_above(upper: xr.DataArray, lower: xr.DataArray, problems: Problems) 
     mean = float((upper - lower).mean())
     expected = "an upper face above the lower one: swap them ([surface] and [upper]), or register them"
     problems.require(not mean < 0, "upper", expected, Words(f"a mean aperture of {quantity_text(mean, 'm')}"))
+
+
+def _generator(table: SurfaceTable) -> str | None:
+    """Return the generator of a table; for an unknown one the first that takes all its arguments."""
+    if table.generate is None or table.generate in GENERATORS:
+        return table.generate
+    keys = {name: arguments_of(f"surfaces.{name}")[0] for name in GENERATORS}
+    return next((name for name in GENERATORS if set(table.options) <= set(keys[name])), None)
 
 
 def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
