@@ -254,7 +254,7 @@ def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> Non
         elif key in keys.kinds:
             keys.kinds[key].check(problems, place, value)
         else:
-            hint = did_you_mean(key, (*keys.kinds, *keys.stages)) or _home_of(key)
+            hint = did_you_mean(key, (*keys.kinds, *keys.stages)) or _home_of(key, name)
             expected = f"one of the keys {', '.join(keys.kinds) or 'none'}"
             problems.add(place, expected, Words(f"an unknown key{hint}"))
     for key in keys.required:
@@ -296,11 +296,12 @@ def _check_arguments(scene: Scene, stage: Stage, problems: Problems) -> None:
         problems.add(row.table, expected, Words(", ".join(loads)) or NONE)
 
 
-def _home_of(key: str) -> str:
-    """Return the tables that a key belongs to, also one that is written as the symbol of the field."""
+def _home_of(key: str, place: str) -> str:
+    """Return the other tables that a key belongs to, also one that is written as the symbol of the field."""
     name = SYMBOLS.get(key.lower(), key)
-    homes = [f"[{row.table}]" for row in STAGES.values() if row.table and name in row.arguments()]
-    homes += ["[material]"] if name in MATERIAL_KEYS else []
+    tables = [row.table for row in STAGES.values() if row.table and name in row.arguments()]
+    tables += ["material"] if name in MATERIAL_KEYS else []
+    homes = [f"[{table}]" for table in tables if table != place]
     if not homes:
         return ""
     return f": {name!r} belongs to {', '.join(homes[:-1])}{' or ' if homes[1:] else ''}{homes[-1]}"

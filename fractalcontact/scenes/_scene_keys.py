@@ -174,6 +174,11 @@ SHARED = {
     "direction": Kind(compass.check_directions, _one_or_several(_DIRECTION)),
 }
 LEVEL = _integer(at_least=0).about("Remove the least-squares polynomial of this degree.")
+PREPARATION = {
+    "level": LEVEL,
+    "despike": FLAG.about("Remove points that stand out from all around them; roughness keeps them."),
+    "fill": FLAG.about("Fill small gaps with the smoothest surface."),
+}
 OF_FILES = {
     "channel": ANYTHING,
     "units": _choice(UNITS),
@@ -182,9 +187,7 @@ OF_FILES = {
     "plane": ANYTHING.about(
         'Of points: "fit", "xy"; of [upper] also "surface", the plane and cells of [surface].'
     ),
-    "level": LEVEL,
-    "despike": FLAG.about("Remove points that stand out from all around them; roughness keeps them."),
-    "fill": FLAG.about("Fill small gaps with the smoothest surface."),
+    **PREPARATION,
 }
 PLANES = {"surface": ("fit", "xy"), "upper": ("fit", "xy", OF_SURFACE)}
 MATERIAL = {
@@ -227,10 +230,9 @@ def surface_forms(place: str) -> dict[str, Keys]:
         "pattern (scans/*.sur) or a list."
     )
     sample = _choice(SAMPLES).about("A surface that is installed with the package.")
-    functions = ("surfaces.read",)
     forms = {
-        "read": Keys({"read": read} | OF_FILES | plane, ("read",), functions=functions),
-        "sample": Keys({"sample": sample} | OF_FILES, ("sample",), functions=functions),
+        "read": Keys({"read": read} | OF_FILES | plane, ("read",), functions=("surfaces.read",)),
+        "sample": Keys({"sample": sample} | PREPARATION, ("sample",)),
     }
     for name in GENERATORS:
         keys, required = arguments_of(f"surfaces.{name}")

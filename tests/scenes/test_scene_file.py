@@ -333,6 +333,18 @@ def test_fragments_of_the_documentation_are_valid(write, page, text):
     assert scene.tables
 
 
+def test_a_sample_has_no_keys_of_a_file(tmp_path):
+    """It has spacing and units of its own: they were accepted and not used."""
+    scene = tmp_path / "sample.toml"
+    scene.write_text(
+        '[surface]\nsample = "concrete_crack"\nspacing = 1e-3\nlevel = 1\n[want]\ndimensions = ["default"]\n'
+    )
+    with pytest.raises(InvalidInput) as raised:
+        fc.scenes.load(scene)
+    assert [line.partition(":")[0] for line in raised.value.problems] == ["surface.spacing"]
+    assert "belongs to" not in raised.value.problems[0]
+
+
 def test_key_of_another_table_is_named_first(write):
     text = SOUND.replace("poisson = 0.2", "poisson = 0.2\nJRC = 10.0").replace("young = 30e9", "young = -1.0")
     with pytest.raises(InvalidInput) as caught:
