@@ -40,7 +40,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     DEPARTURE,
     HURST,
     NOISE,
-    RATIO,
+    RATIO_DEVIATION,
     SPREAD,
     Known,
     Posterior,
@@ -263,7 +263,7 @@ class Classes:
         """Return the spectrum with the log ratio by Fisher scoring, its covariance, and -2 log evidence.
 
         The evidence is that of the classes about the mean of their ring, over the prior of the log ratio. A
-        lay is there with the probability of a departure, u and v are normal; without one they are zero. With
+        lay is there with the probability of a departure: u and v are normal. Without one they are zero. With
         no prior the azimuths of a few long waves of white noise make a blurred lay as probable as noise.
         """
         weight = self.count * self.information
@@ -280,7 +280,7 @@ class Classes:
                 break
         excess = self.excess(self.relative(spectrum))
         deviance = 2.0 * weight @ (excess - np.log(np.maximum(1.0 + excess, _EMPTY)))
-        over = np.eye(2) + RATIO**2 * information
+        over = np.eye(2) + RATIO_DEVIATION**2 * information
         turned = uv @ information @ np.linalg.solve(over, uv) + np.linalg.slogdet(over)[1]
         isotropic = uv @ information @ uv  # by so much the deviance is higher without a lay
         logs = math.log(DEPARTURE) - 0.5 * turned, math.log(1.0 - DEPARTURE) - 0.5 * isotropic

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.dimensions._mode_bins import LEAST
-from fractalcontact.dimensions._surface_input import A_TENTH, Surface
+from fractalcontact.dimensions._surface_input import NOTABLE_SHARE, Surface
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -128,8 +128,8 @@ def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0) -> str:
     """Look for squared differences beyond those of a Gaussian surface.
 
     The quantile of a sample of this `size` scatters by .2 %. `spike`: standard deviations; 1e8 Gaussian
-    second differences reach 5.7, scanned rock faces 39. With less than `A_TENTH` of the squares noise and
-    misfit describe them.
+    second differences reach 5.7, scanned rock faces 39. With less than `NOTABLE_SHARE` of the squares noise
+    and misfit describe them.
     """
     step = -(-heights.size // size)
     sample = np.concatenate([squares.ravel()[::step] for squares in _squared_bends(heights)])
@@ -142,7 +142,7 @@ def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0) -> str:
     for squares in _squared_bends(heights):
         high = squares[squares > spike**2 * typical]
         number, above, total = number + high.size, above + high.sum(), total + np.nansum(squares)
-    if typical == 0.0 or above < A_TENTH * total:
+    if typical == 0.0 or above < NOTABLE_SHARE * total:
         return ""
     return (
         f"{number} heights stand out of their neighbours by more than {spike:.0f} standard deviations: "

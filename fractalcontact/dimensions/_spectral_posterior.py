@@ -55,13 +55,14 @@ DEPARTURE = 0.1
 # to 9 and 6 to 19 % wider with .3 and .5 than with .2. With .3 `directions` gives white noise H = .5
 _NOISY = 0.2
 # Deviation of the logarithm of a positive number of which nothing else is known: a factor of e
-_ANY = 1.0
+_DEVIATION = 1.0
 # Normal in ln nu (of the rms increment), ln s (spacings) and ln k. 95 % of instruments add noise of 1 to
 # 50 %: with a median of .05 the intervals of `directions` missed H = .7 in one of six surfaces with noise of
 # .3, with .1 exact intervals of H = .5 are 1.1 times as wide. 95 % of ratios, as k and those of lengths, are
 # 1 / 4 to 4: with a factor of e in place of 2 white noise is taken for a wide bend
-RATIO = math.log(2.0)
-_PRIOR_NOISE, _PRIOR_SPREAD, _PRIOR_SHARPNESS = (math.log(0.07), _ANY), (0.0, _ANY), (0.0, RATIO)
+RATIO_DEVIATION = math.log(2.0)
+_PRIOR_NOISE, _PRIOR_SPREAD = (math.log(0.07), _DEVIATION), (0.0, _DEVIATION)
+_PRIOR_SHARPNESS = 0.0, RATIO_DEVIATION
 _LONG_HURSTS = -1.0, 1.0  # from a plateau to heights without a fractal dimension
 _TAUS = 0.02, 0.05, 0.12, 0.3, 0.8  # geometric, from 2 % to a factor; the last one at a cut
 _OCTAVE = math.log(2.0)
@@ -414,7 +415,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e3) -> tuple[Array,
     """Return the matrix that makes the bins of (2) white, zero for those that do not count, and its log
     density.
 
-    A bin beyond a cut has the expected logarithm of the density of the deviation `_ANY`. `flat` is
+    A bin beyond a cut has the expected logarithm of the density of the deviation `_DEVIATION`. `flat` is
     the variance of ln A: two deviations are a factor of e^63. Known noise determines A.
     """
     octaves = bins.lnq / _OCTAVE
@@ -425,7 +426,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e3) -> tuple[Array,
     whitening = np.zeros(covariance.shape)
     # above the diagonal the library leaves zeros or rounding, in one process not as in another
     whitening[inside] = np.tril(np.linalg.inv(lower))
-    outside = bins.variance[~kind.inside] + _ANY**2
+    outside = bins.variance[~kind.inside] + _DEVIATION**2
     density = -np.log(np.diag(lower)).sum() - 0.5 * np.sum(np.log(outside) + 1.0)
     return whitening, math.log(kind.prior) + float(density)
 

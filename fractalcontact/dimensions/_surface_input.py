@@ -20,7 +20,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Scales = tuple[float, float] | None
 
 ROUNDING = 1e-12  # of the range of heights
-A_TENTH = 0.1  # of the points, or of their squares: from here on repeated ones, or spikes, matter
+NOTABLE_SHARE = 0.1  # of the points, or of their squares: from here on repeated ones, or spikes, matter
 MIDDLE = 128  # points to each side of the middle that are inspected for interpolation
 LARGEST = 4096  # edge of what is transformed at a time of a surface that is not in memory, 134 MB
 SLAB = 1 << 25  # heights read at a time from a surface that is not in memory
@@ -183,7 +183,7 @@ class Surface:
             straight = np.rint(straight * (1e9 / largest)) if largest > 0 else straight
             bent = np.rint(bend[np.abs(bend) > rounding] / (8.0 * rounding))
             # distinct heights of measured points; kinks along one edge of an interpolation may be alike
-            are_distinct = np.unique(straight).size > (1.0 - A_TENTH) * straight.size
+            are_distinct = np.unique(straight).size > (1.0 - NOTABLE_SHARE) * straight.size
             if are_distinct and np.unique(bent).size >= 0.5 * bent.size:
                 share = max(share, straight.size / known)
         return share
@@ -196,7 +196,7 @@ class Surface:
         """
         for lines in (self._middle, self._middle.T):
             starts = np.flatnonzero((lines[1:] != lines[:-1]).any(axis=1))
-            if 2 < len(starts) < (1.0 - A_TENTH) * (len(lines) - 1):
+            if 2 < len(starts) < (1.0 - NOTABLE_SHARE) * (len(lines) - 1):
                 apart = np.abs(starts - np.linspace(starts[0], starts[-1], len(starts))).max()
                 if apart <= 1.0:
                     return True

@@ -21,7 +21,7 @@ SOURCE = "Falconer, Fractal Geometry (1990), ch. 3; Bale and Schmidt, Phys. Rev.
 # pairs along the axes and along the diagonals, at a lag of one step and then of two
 OFFSETS = np.kron([[1], [2]], [(0, 1), (1, 0), (1, 1), (1, -1)])
 LAGS = np.hypot(*OFFSETS.T)  # in cells
-REACH = 2  # cells of the longest offset along an axis
+REACH = int(np.abs(OFFSETS).max())  # cells of the longest offset along an axis
 
 
 @public_result(title="Dimension of the boundary of a set", references=SOURCE, check=_masks.check_mask)

@@ -93,9 +93,8 @@ def _fewest_boxes(
         cells, size, row_bands, column_bands[~is_full], positions, beyond, met, lost, count, area
     )
     fewest, least = [], []
-    step = max(
-        1, (1 << 22) // fold
-    )  # sums that are added up at a time: those of a large plane take gigabytes
+    # sums that are added up at a time: those of a large plane take gigabytes
+    step = max(1, (1 << 22) // fold)
     for start in range(0, offsets, step):
         rows = slice(start, start + step)
         full, cut = (v[rows].reshape(-1, fold // size, size).sum(1, dtype=np.int64) for v in (met, lost))

@@ -109,7 +109,16 @@ def closure(
     directions, shears = read_directions(direction), float_array(shear)
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     pressing = Pressing.read(
-        crack, WHERE, loads, influence, disc_radius, hardness, tolerance, method, bulk=bulk, keep=keep
+        crack,
+        WHERE,
+        loads,
+        bulk=bulk,
+        keep=keep,
+        influence=influence,
+        disc_radius=disc_radius,
+        hardness=hardness,
+        tolerance=tolerance,
+        method=method,
     )
     result = pressed_dataset(pressing, shears, directions, progress)
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)

@@ -122,7 +122,16 @@ def dilatancy(
         return rigid
     load, spring = {"normal_force": normal_force}, None
     pressing = Pressing.read(
-        crack, WHERE, load, influence, disc_radius, hardness, tolerance, method, bulk=bulk, keep=keep
+        crack,
+        WHERE,
+        load,
+        bulk=bulk,
+        keep=keep,
+        influence=influence,
+        disc_radius=disc_radius,
+        hardness=hardness,
+        tolerance=tolerance,
+        method=method,
     )
     if normal_stiffness is not None:
         spring = Spring(rigid["rigid_dilatancy"].values, normal_stiffness * crack.nominal_area)

@@ -173,7 +173,15 @@ def direct_shear(
     assert step is not None
     legs = _legs(_turning_points(path), step)
     load = {"nominal_pressure": nominal_pressure}
-    pressing = Pressing.read(crack, WHERE, load, influence, disc_radius, hardness, tolerance)
+    pressing = Pressing.read(
+        crack,
+        WHERE,
+        load,
+        influence=influence,
+        disc_radius=disc_radius,
+        hardness=hardness,
+        tolerance=tolerance,
+    )
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
     spring = 0.0 if normal_stiffness is None else float(normal_stiffness) * area

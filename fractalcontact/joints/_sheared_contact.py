@@ -38,9 +38,9 @@ Columns = dict[str, Array]
 T = TypeVar("T", "Pressed", "Sheared")
 
 # how the faces of the flat block are loaded, and what that makes of the bulk part of the closure
-RIGID = "rigid", "closure of the flat block under the same force and the same influence coefficients"
-UNIFORM = "uniform", "mean displacement of the flat block under the same force, uniformly spread"
-BULK = {"flat_block": RIGID, "uniform_pressure": UNIFORM}
+FLAT_BLOCK = "rigid", "closure of the flat block under the same force and the same influence coefficients"
+UNIFORM_PRESSURE = "uniform", "mean displacement of the flat block under the same force, uniformly spread"
+BULK = {"flat_block": FLAT_BLOCK, "uniform_pressure": UNIFORM_PRESSURE}
 LOADS = ("closure", "normal_force", "nominal_pressure")
 CONTACT_OPTIONS = ("influence", "disc_radius", "hardness", "tolerance", "method")
 # bytes of a cell: the solver of a free body with the steps before (196), delta-surface and flat block
@@ -68,15 +68,15 @@ class Pressing:
         crack: Crack,
         where: str,
         loads: Mapping[str, Any],
-        *ordered: Any,
+        *,
         bulk: str = "flat_block",
         keep: Any = (),
-        **named: Any,
+        **contact_options: Any,
     ) -> Pressing:
-        """Return it from arguments that passed `check_pressing`; `CONTACT_OPTIONS` in order, or named."""
+        """Return it from arguments that passed `check_pressing`, with some of `CONTACT_OPTIONS`."""
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
-        options = ContactOptions(_boundary(crack), *ordered, **named)
+        options = ContactOptions(_boundary(crack), **contact_options)
         return cls(crack, where, LoadPath.among(loads), options, bulk, word_tuple(keep))
 
     @property
