@@ -87,7 +87,6 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import in_bands
 from fractalcontact.contact import _kernels
@@ -462,9 +461,7 @@ class ConstrainedCG:
             self.project_onto_bounds(force)
             return
         rows, size = self.h.shape[0], self.h.size
-        out = self.work_array if fft.writes_in_place() else None
-        self.work_array = RELEASED
-        self.work_array = self.operator.displacement(out)  # r (7)
+        self.work_array = self.operator.displacement(self.work_array)  # r (7)
         in_bands(subtract_step, rows, size, self.p, self.t, tau)  # p = p - tau t (9)
         in_bands(subtract_step, rows, size, self.u, self.work_array, tau)  # u = u - tau r (10)
         self.updates += 1

@@ -27,12 +27,12 @@ class ModesMemory:
 
     def __init__(self) -> None:
         self.memory = np.empty(0, np.complex128)
-        self.views: dict[Any, Array | None] = {}  # by shape and type
+        self.views: dict[Any, Array] = {}  # by shape and type
 
-    def array(self, shape: tuple[int, int], dtype: Any) -> Array | None:
-        """Return an array for the modes of a real plane; None where the library makes a new one."""
+    def array(self, shape: tuple[int, int], dtype: Any) -> Array:
+        """Return an array for the modes of a real plane."""
         if (shape, dtype) not in self.views:
-            self.views[shape, dtype] = self._view(shape, dtype) if fft.writes_in_place() else None
+            self.views[shape, dtype] = self._view(shape, dtype)
         return self.views[shape, dtype]
 
     def _view(self, shape: tuple[int, int], dtype: Any) -> Array:
@@ -207,7 +207,7 @@ class WavenumberMultiplier:
     def apply(self, plane: Array, out: Array | None = None) -> Array:
         """Return the plane with its modes multiplied.
 
-        Where the FFT library can, it writes into `out`, which may be the plane itself.
+        It is written into `out` if given, which may be the plane itself.
         """
         if self.is_small:
             return self.apply_at_once(plane, out)
@@ -220,7 +220,7 @@ class WavenumberMultiplier:
         weights = wavenumber_weights(self.shape, self.spacing, *self.law, plane.dtype.char)
         parts = modes.view(plane.dtype)
         np.multiply(parts, weights, out=parts)
-        return self.transform.backward(modes, out if self.transform.in_place else None)
+        return self.transform.backward(modes, out)
 
     def work(self, plane: Array) -> float:
         """Return the sum of a plane times what `apply` would return, and keep the modes for `plane`."""
