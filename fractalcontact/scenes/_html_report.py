@@ -9,9 +9,8 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -128,54 +127,27 @@ def report(
             from fractalcontact import plotting  # only here: `run` has drawn them
 
             files = plotting.draw(pictured(tree), folder)
-        with pictures_of(files) as pictures:
-            return write_report(tree, target, pictures, summary_of(tree))
-
-
-@contextmanager
-def pictures_of(figures: Sequence[str | os.PathLike[str]]) -> Iterator[Iterator[tuple[str, bytes]]]:
-    """Provide names and contents of pictures for `write_report`, which threads encode within this context.
-
-    The encoder releases the interpreter lock.
-    """
-    with ThreadPoolExecutor(thread_count()) as pool:
-        yield pool.map(_picture_file, map(Path, figures))
+        return write_report(tree, target, files, summary_of(tree))
 
 
 def write_report(
-    tree: xr.DataTree,
-    target: Path,
-    pictures: Iterable[tuple[str, bytes]],
-    summary: Summary,
-    contents: Mapping[str, Any] | None = None,
+    tree: xr.DataTree, target: Path, figures: Sequence[str | os.PathLike[str]], summary: Summary
 ) -> Path:
-    """Write the report with these pictures, this summary and the `page_contents`, computed if not given."""
-    text = _page(tree, pictures, summary, contents or page_contents(tree), target)
+    """Write the report with these figures and this summary."""
+    with ThreadPoolExecutor(thread_count()) as pool:  # the encoder releases the interpreter lock
+        pictures = pool.map(_picture_file, map(Path, figures))
+        text = _page(tree, pictures, summary, target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return target
 
 
-def page_contents(tree: xr.DataTree) -> dict[str, Any]:
-    """Return what the page shows beside the figures and the summary: the surface, the maps and the curves."""
-    single = of_member(tree, 0)
-    return {
-        "surface": _surface(single),
-        "maps": list(_maps(single)),
-        "curves": [_curve_table(name, frame) for name, frame in _curves(tree).items()],
-    }
-
-
-def _page(
-    tree: xr.DataTree,
-    figures: Iterable[tuple[str, bytes]],
-    summary: Summary,
-    contents: Mapping[str, Any],
-    target: Path,
-) -> str:
+def _page(tree: xr.DataTree, figures: Iterable[tuple[str, bytes]], summary: Summary, target: Path) -> str:
     """Return the text of the page."""
-    overview, scene = group_of(tree, OVERVIEW), scene_of(tree)
+    overview, scene, single = group_of(tree, OVERVIEW), scene_of(tree), of_member(tree, 0)
+    surface, maps = _surface(single), list(_maps(single))
+    curves = [_curve_table(name, frame) for name, frame in _curves(tree).items()]
     scans = [] if overview is None else map(str, overview[SCAN].values)
     pages = {name: page for name in scans if (target.parent / (page := page_of(name))).is_file()}
     written = str(tree.attrs.get("history", "")).split(" ")[0]
@@ -195,7 +167,9 @@ def _page(
         scene=_as_json(scene) if scene else "",
         provenance=_as_json(provenance_of(tree)),
         references=str(tree.attrs.get("references", "")),
-        **contents,
+        surface=surface,
+        maps=maps,
+        curves=curves,
     )
 
 

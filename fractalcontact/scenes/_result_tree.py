@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -21,10 +21,9 @@ from fractalcontact.base.study import MEMBER, group_of, joined_references, prove
 from fractalcontact.scenes._joint_stages import JRC_COLUMN
 from fractalcontact.scenes._result_tables import SCAN, Column, ResultTable, Rows, cell, column_scale, table_of
 from fractalcontact.scenes._scene import Scene
+from fractalcontact.scenes._study import StudyResults, stacked, total_seconds
 
-if TYPE_CHECKING:
-    from fractalcontact.scenes._study import StudyResults
-
+Numbers = dict[str, xr.Dataset]
 OWN_REFERENCES = "see the references of each group"
 PARTIAL = "partial: "  # start of the attribute `completeness`
 
@@ -156,8 +155,9 @@ _ROWS = Rows(
 def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the numbers that stand for a study: dimensions of the first method, else the largest values.
 
-    Of an ensemble they are means over the members. The attributes `over` and `group` are the dims over which
-    each is the largest and the group that it is from; `in_words` puts them into the names.
+    Of an ensemble they are means over the members, of many scans values along `scan`. The attributes `over`
+    and `group` are the dims over which each is the largest and the group that it is from; `in_words` puts
+    them into the names.
     """
     main: dict[str, xr.DataArray] = {}
     for entry in MAIN:
@@ -165,10 +165,11 @@ def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
             result = results[group]
             for name in (name for name in (entry.name, *entry.beside) if name in result):
                 values = result[name].isel(method=0, drop=True) if "method" in result.dims else result[name]
-                others = [str(dim) for dim in values.dims if dim != MEMBER]
-                number = values.max(others).mean() if others else values.mean()
+                others = [str(dim) for dim in values.dims if dim not in (MEMBER, SCAN)]
+                number = values.max(others) if others else values
+                number = number.mean(MEMBER) if MEMBER in number.dims else number
                 attributes = {"long_name": name} | values.attrs | {"over": others, "group": group}
-                main[name] = number.drop_vars(number.coords).assign_attrs(attributes)
+                main[name] = number.reset_coords(drop=True).assign_attrs(attributes)
     return xr.Dataset(main)
 
 
@@ -180,6 +181,33 @@ def in_words(main: xr.Dataset, *, with_group: bool) -> xr.Dataset:
         largest = f": the largest over {', '.join(over)}" if over else ""
         values.attrs["long_name"] += largest + (f", of the group {group}" if with_group else "")
     return described
+
+
+def tree_of_scans(scene: Scene, reasons: Mapping[str, str], numbers: Mapping[str, Numbers]) -> xr.DataTree:
+    """Return the numbers of all scans along `scan`, their means, and a row for each in the overview.
+
+    A row has what stands for the study of the scan, NaN where there is none, and of `reasons` why it or some
+    of its stages failed, "" where it is finished. Of the `numbers` of a scan, its groups, "" is the root.
+    """
+    groups: dict[str, xr.Dataset] = {OVERVIEW: xr.Dataset(coords={SCAN: list(reasons)})}
+    for path in dict.fromkeys(path for each in numbers.values() for path in each if path):
+        having = {name: each[path] for name, each in numbers.items() if path in each}
+        if any(data.data_vars for data in having.values()):
+            groups[path] = stacked(having, SCAN)
+    main = groups[OVERVIEW].merge(main_results(groups), join="left")
+    done = {name: "incomplete" if reasons[name] else "done" for name in numbers}
+    caveats = {name: str(each[""].attrs.get("caveats", "none")) for name, each in numbers.items()}
+    found = [caveats.get(name, "none") for name in reasons]
+    overview = in_words(main, with_group=False)
+    overview["status"] = (SCAN, [done.get(name, "failed") for name in reasons])
+    overview["reason"] = (SCAN, list(reasons.values()), {"long_name": "why it failed"})
+    overview["caveats"] = (SCAN, ["" if text == "none" else text for text in found])
+    groups[OVERVIEW] = schema.label(overview, keep_notes=True)
+    stages = (provenance_of(each[""]).get("stages", {}).items() for each in numbers.values())
+    seconds = total_seconds({name: facts["run_time"] for name, facts in each} for each in stages)
+    tree = result_tree(scene, StudyResults(groups, seconds), pooled(main))
+    tree.attrs["caveats"] = "none"  # the overview has those of each
+    return tree
 
 
 def pictured(tree: xr.DataTree) -> xr.DataTree:

@@ -10,43 +10,43 @@ import os
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from fractalcontact.base import netcdf, signals
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput, warn
-from fractalcontact.base.file_contents import read_headers, stage_rows
+from fractalcontact.base.file_contents import read_headers
 from fractalcontact.base.files import PARTIAL_RESULT, RESULT, locked, written_whole
-from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK, most_workers
-from fractalcontact.base.schema import label
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _result_tree, _results_folder
 from fractalcontact.scenes._executor import Workers, run_tasks, worker_processes, workers_of
 from fractalcontact.scenes._export import MAP_DIMS, tables
-from fractalcontact.scenes._html_report import page_contents, pictures_of, write_report
+from fractalcontact.scenes._html_report import write_report
 from fractalcontact.scenes._inputs import read_surface
 from fractalcontact.scenes._result_tables import SCAN
+from fractalcontact.scenes._result_tree import Numbers
 from fractalcontact.scenes._results_folder import REPORT, SCANS, PartStore, digest_of, folder_of, with_seeds
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._scene_file import scans_of
 from fractalcontact.scenes._stages import FIGURES, check_memory, stages_of
-from fractalcontact.scenes._study import Study, StudyResults, reason_of, stacked, study_ensemble
+from fractalcontact.scenes._study import (
+    Study,
+    reason_of,
+    study_ensemble,
+)
 from fractalcontact.scenes._summary import Summary, datasheet, summary_of
 from fractalcontact.scenes._validation import validated, warn_of_result
 
 DIGEST = "study_digest"  # attribute of a finished scan: of its file, its settings and the version
 NO_ACCESS = "the worker does not see the folder of the results"
-Numbers = dict[str, xr.Dataset]
 
 
 def run(
@@ -156,31 +156,25 @@ def _run_scans(
                 tree[f"{SCANS}/{file.parent.name}"] = netcdf.open(file)
             return tree, whole
     with locked(folder), signals.noted() as stop:
-        studies = ScanStudies(scans, folder)
-        with netcdf.GrowingFile(folder / RESULT) as together:
-            studies.run(together, workers, stop, progress)
-            if stop:
-                done = f"{len(scans) - studies.missing} of {len(scans)} scans are finished"
-                raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
-            groups = studies.groups()
-            tree = _result_tree.result_tree(
-                scene, StudyResults(groups, studies.seconds), _result_tree.pooled(studies.main())
-            )
-            _result_tree.note_run_time(tree, start)
-            tree.attrs["caveats"] = "none"
-            together.add(tree)
+        studied = _study_scans(scans, folder, workers, stop, progress)
+        if stop:
+            done = f"{len(studied)} of {len(scans)} scans are finished"
+            raise signals.Stopped(stop.number, f"{done}; the same run resumes from them")
+        reasons = {name: studied[name][0] for name in scans}
+        numbers = {name: studied[name][1] for name in scans if studied[name][1]}
+        tree = _result_tree.tree_of_scans(scene, reasons, numbers)
+        _result_tree.note_run_time(tree, start)
+        netcdf.write(tree, folder / RESULT, _maps_of_scans(folder / SCANS, numbers))
         with _beside_the_result():
             frame = next(iter(tables(tree[_result_tree.OVERVIEW].to_dataset()).values()))
             with written_whole(folder / _results_folder.CSV) as temporary:
                 frame.to_csv(temporary, index=False)
-            is_drawn = scene.want.figures and studies.numbers
+            is_drawn = scene.want.figures and numbers
             figures = _draw(_result_tree.pictured(tree), folder, progress) if is_drawn else []
-            _results_folder.remove_old_figures(folder, figures)
-            with pictures_of(figures) as pictures:
-                whole = summary_of(tree)
-                write_report(tree, folder / REPORT, pictures, whole)
+            whole = summary_of(tree)
+            write_report(tree, folder / REPORT, figures, whole)
         PartStore(folder).clear()  # of marks for workers; each scan has its own parts
-        failed = sum(map(bool, studies.reasons.values()))
+        failed = sum(map(bool, reasons.values()))
         if failed:
             message = f"{failed} of {len(scans)} scans failed or are incomplete; the table states why"
             warn(message, FractalContactWarning)
@@ -240,39 +234,23 @@ def _run(
         raise signals.Stopped(
             stop.number, f"finished parts are in {PARTIAL_RESULT}; the same run resumes from them"
         )
-    calls = (
-        lambda: _save_and_draw(tree, scene, folder, progress),
-        lambda: (page_contents(tree), summary_of(tree)),
-    )
-    # a copy of this process prepares the page meanwhile
-    results: dict[int, Any] = dict(calls_in_two_processes(lambda number: calls[number](), 2))
-    figures, (contents, whole) = results[0], results[1]
-    with _beside_the_result(), pictures_of(figures) as pictures:
-        if scene.want.figures:
-            _result_tree.note_run_time(tree, start)
-            _results_folder.remove_old_figures(folder, figures)
-        whole = replace(whole, stages=stage_rows(tree))  # with the time of the figures
+    # before figures and report: a disk that fills, or a kill, while they are made loses nothing
+    netcdf.save(tree, folder / RESULT)
+    (folder / PARTIAL_RESULT).unlink(missing_ok=True)
+    with _beside_the_result():
+        figures = _draw(tree, folder, progress) if scene.want.figures else []
+        _result_tree.note_run_time(tree, start)
+        whole = summary_of(tree)
         tree.attrs["caveats"] = "\n".join(whole.caveats) or "none"
         changed = {name: tree.attrs[name] for name in ("provenance", "caveats")}
-        with ThreadPoolExecutor(1) as beside:  # the file waits for the disk while the page is written
-            replaced = beside.submit(netcdf.replace_attributes, folder / RESULT, changed)
-            write_report(tree, folder / REPORT, pictures, whole, contents)
-            replaced.result()
+        netcdf.replace_attributes(folder / RESULT, changed)
+        write_report(tree, folder / REPORT, figures, whole)
         if scene.want.datasheet and not study.failures:
             tables(tree, folder / _results_folder.TABLES)
             _draw_datasheet(tree, folder / _results_folder.DATASHEET)
     if not study.failures:
         store.clear()
     return tree, whole
-
-
-def _save_and_draw(tree: xr.DataTree, scene: Scene, folder: Path, progress: bool) -> list[Path]:
-    """Save the results, draw the figures if they are wanted, and return their files."""
-    # before figures and report: a disk that fills, or a kill, while they are made loses nothing
-    netcdf.save(tree, folder / RESULT)
-    (folder / PARTIAL_RESULT).unlink(missing_ok=True)
-    with _beside_the_result():
-        return _draw(tree, folder, progress) if scene.want.figures else []
 
 
 def _check(summary: Any, verbose: Any, force: Any, workers: Any, client: Any) -> None:
@@ -313,11 +291,12 @@ def _beside_the_result() -> Iterator[None]:
 
 
 def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:
-    """Draw the figures, note the time they took, and return their files."""
+    """Draw the figures in place of earlier ones, note the time they took, and return their files."""
     from fractalcontact import plotting
 
     start = time.perf_counter()
     files = plotting.draw(tree, folder, progress=progress)
+    _results_folder.remove_old_figures(folder, files)
     entry = provenance_of(tree)
     entry["stages"][FIGURES] = {"run_time": time.perf_counter() - start, "origin": "computed"}
     tree.attrs["provenance"] = json.dumps(entry)
@@ -372,101 +351,29 @@ def _numbers(tree: xr.DataTree) -> Numbers:
     return {name: data.drop_dims(MAP_DIMS, errors="ignore") for name, data in groups.items()}
 
 
-@dataclass
-class ScanStudies:
-    """The studies of the scans of a scene: why some failed, and their numbers as far as they are finished.
+def _study_scans(
+    scans: Mapping[str, Scene], folder: Path, workers: Workers | None, stop: signals.Stop, progress: bool
+) -> dict[str, tuple[str, Numbers]]:
+    """Return of every scan why it or some of its stages failed, "" if none, and its numbers.
 
-    Attributes
-    ----------
-    reasons : dict of str to str
-        By scan, why it or some of its stages failed; empty where it is finished.
-    numbers : dict of str to mapping
-        The groups of each scan that has a result; "" is their root.
+    Those that a stop has left out are missing.
     """
+    place = folder / SCANS
+    place.mkdir(exist_ok=True)
+    tasks = {name: _ScanTask(scene, place / folder_of(name)) for name, scene in scans.items()}
+    # of formats with two bytes for each point, the smallest
+    sources = (each.folder / os.path.expandvars(str(each.surface.read)) for each in scans.values())
+    points = max((source.stat().st_size // 2 for source in sources if source.is_file()), default=0)
+    finished = run_tasks(tasks, PartStore(folder), stop, workers, points=points)
+    studied = dict(signals.track(finished, progress, SCANS, unit=SCAN, total=len(tasks)))
+    for name, (_, numbers) in studied.items():
+        if numbers and not (tasks[name].folder / RESULT).is_file():
+            studied[name] = NO_ACCESS, {}
+    return studied
 
-    scans: Mapping[str, Scene]
-    folder: Path
-    reasons: dict[str, str] = field(default_factory=dict)
-    numbers: dict[str, Numbers] = field(default_factory=dict)
 
-    def run(
-        self, file: netcdf.GrowingFile, workers: Workers | None, stop: signals.Stop, progress: bool
-    ) -> None:
-        """Study the scans that are not finished; each failure is a reason.
-
-        The maps of a scan are written to the file of all as soon as those of the scans before it are: this
-        process has time for it while workers study the next ones.
-        """
-        names = list(self.scans)
-        (self.folder / SCANS).mkdir(exist_ok=True)
-        place = self.folder / SCANS
-        tasks = {name: _ScanTask(scene, place / folder_of(name)) for name, scene in self.scans.items()}
-        # of formats with two bytes for each point, the smallest
-        sources = (each.folder / os.path.expandvars(str(each.surface.read)) for each in self.scans.values())
-        points = max((source.stat().st_size // 2 for source in sources if source.is_file()), default=0)
-        finished = run_tasks(tasks, PartStore(self.folder), stop, workers, points=points)
-        found: dict[str, tuple[str, Numbers]] = {}
-        for name, result in signals.track(finished, progress, SCANS, unit=SCAN, total=len(names)):
-            found[name] = result
-            while len(self.reasons) < len(names) and names[len(self.reasons)] in found:
-                self._add(names[len(self.reasons)], *found.pop(names[len(self.reasons)]), file)
-        for name in found:  # behind one that a stop left out
-            self._add(name, *found[name], file)
-
-    def _add(self, name: str, reason: str, numbers: Numbers, file: netcdf.GrowingFile) -> None:
-        """Note the result of a scan, and write its maps."""
-        result = self.folder / SCANS / folder_of(name) / RESULT
-        if not numbers or not result.is_file():
-            self.reasons[name] = NO_ACCESS if numbers else reason
-            return
-        if not self.numbers:  # the groups of all scans come before those of each
-            paths = (_result_tree.OVERVIEW, *(path for path in numbers if path and numbers[path].data_vars))
-            file.add_groups({f"/{path}": xr.Dataset() for path in paths})
-        self.reasons[name], self.numbers[name] = reason, numbers
-        place = f"/{SCANS}/{result.parent.name}"
-        file.add_groups({place + path: maps for path, maps in netcdf.groups_over(result, MAP_DIMS).items()})
-
-    @property
-    def missing(self) -> int:
-        """How many scans a stop has left out."""
-        return len(self.scans) - len(self.reasons)
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds that each stage took, all scans together."""
-        total: dict[str, float] = {}
-        for groups in self.numbers.values():
-            for stage, facts in provenance_of(groups[""]).get("stages", {}).items():
-                total[stage] = total.get(stage, 0.0) + float(facts["run_time"])
-        return total
-
-    def groups(self) -> Numbers:
-        """Return the numbers of all scans along `scan`, and the overview."""
-        groups = {_result_tree.OVERVIEW: self._overview()}
-        for path in dict.fromkeys(path for each in self.numbers.values() for path in each if path):
-            having = {name: each[path] for name, each in self.numbers.items() if path in each}
-            if any(data.data_vars for data in having.values()):
-                groups[path] = stacked(having, SCAN)
-        return groups
-
-    def main(self) -> xr.Dataset:
-        """Return the main results of all scans, NaN where a scan has none."""
-        mains = {name: _result_tree.main_results(groups) for name, groups in self.numbers.items()}
-        table = xr.Dataset(coords={SCAN: list(self.reasons)})
-        for key in dict.fromkeys(key for main in mains.values() for key in main.data_vars):
-            found = {name: main[key] for name, main in mains.items() if key in main}
-            values = [float(found.get(name, np.nan)) for name in self.reasons]
-            table[key] = (SCAN, values, next(iter(found.values())).attrs)
-        return table
-
-    def _overview(self) -> xr.Dataset:
-        """Return a row for every scan: what stands for its study, whether it failed, and why."""
-        roots, reasons = {name: each[""] for name, each in self.numbers.items()}, self.reasons
-        table = _result_tree.in_words(self.main(), with_group=False)
-        done = {name: "incomplete" if reasons[name] else "done" for name in roots}
-        caveats = {name: str(root.attrs.get("caveats", "none")) for name, root in roots.items()}
-        found = [caveats.get(name, "none") for name in reasons]
-        table["status"] = (SCAN, [done.get(name, "failed") for name in reasons])
-        table["reason"] = (SCAN, list(reasons.values()), {"long_name": "why it failed"})
-        table["caveats"] = (SCAN, ["" if text == "none" else text for text in found])
-        return label(table, keep_notes=True)
+def _maps_of_scans(place: Path, names: Iterable[str]) -> Iterator[dict[str, xr.Dataset]]:
+    """Yield the groups that have the maps of each scan."""
+    for folder in map(folder_of, names):
+        maps = netcdf.groups_over(place / folder / RESULT, MAP_DIMS)
+        yield {f"/{SCANS}/{folder}{path}": each for path, each in maps.items()}

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -347,11 +347,17 @@ def study_ensemble(
         name: stacked({member: done.groups[name] for member, done in members.items()}, MEMBER)
         for name in names
     }
-    seconds: dict[str, float] = {}
-    for done in members.values():
-        seconds |= {name: seconds.get(name, 0.0) + spent for name, spent in done.seconds.items()}
+    seconds = total_seconds(done.seconds for done in members.values())
     missing = [f"{count - len(members)} of {count} members"] if len(members) < count else []
     return StudyResults(groups, seconds, missing)
+
+
+def total_seconds(of_studies: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    """Return the seconds that each stage took in all studies together."""
+    total: dict[str, float] = {}
+    for seconds in of_studies:
+        total |= {name: total.get(name, 0.0) + spent for name, spent in seconds.items()}
+    return total
 
 
 RAGGED = ("island", "link")  # dims whose length differs from study to study: their rows are listed
