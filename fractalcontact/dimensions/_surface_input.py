@@ -308,19 +308,14 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
     if heights.size == 0:
         problems.add("surface", "at least one surface", f"shape {heights.shape}")
         return
-    distinct = _distinct(heights)
+    # without the repetitions of a broadcast, as of the surface of a scene that is planned
+    distinct = heights[tuple(slice(1 if step == 0 else None) for step in heights.strides)]
     if np.isfinite(distinct.min()) and np.isfinite(distinct.max()):
         return
-    core = int(np.prod(heights.shape[-axes:]))
     if not gaps:
         problems.finite("surface", heights, remedy="see fractalcontact.surfaces.fill")
-    elif not np.isfinite(heights).reshape(-1, core).any(axis=1).all():
+    elif not np.isfinite(heights).any(axis=tuple(range(-axes, 0))).all():
         problems.add("surface", "observed heights", "nothing but NaN")
-
-
-def _distinct(values: Array) -> Array:
-    """Return values without the repetitions of a broadcast, as of the surface of a scene that is planned."""
-    return values[tuple(slice(1 if step == 0 else None) for step in values.strides)]
 
 
 def middle_slices(shape: Iterable[int], edge: int) -> tuple[slice, ...]:
