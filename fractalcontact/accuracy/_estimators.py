@@ -383,7 +383,7 @@ def _with_reasons(table: xr.Dataset) -> xr.Dataset:
 def _checkpoint(table: xr.Dataset, entropy: dict[str, Any]) -> xr.Dataset:
     """Return the table as far as it is filled, labelled, with the random stream to continue with."""
     parameters = {str(name): coordinate.values for name, coordinate in table.coords.items()}
-    labelled = label(_with_reasons(table.copy()), keep_notes=True)
+    labelled = label(_with_reasons(table.copy()))
     return stamp(labelled, WHERE, parameters, title=TITLE, references=REFERENCES, random=entropy)
 
 

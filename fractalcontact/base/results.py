@@ -167,7 +167,7 @@ def public_result(
             if isinstance(result, xr.Dataset):
                 result = result if "run_time" in result.variables else _with_run_time(result, elapsed)
             entries.setdefault("run_time", elapsed)
-            result = label(result, keep_notes=True)
+            result = label(result)
             give_reasons(result, reasons)
             result = stamp(result, name, parameters, **entries)
             if done:

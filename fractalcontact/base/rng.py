@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
@@ -63,22 +64,20 @@ def record(rng: np.random.Generator) -> dict[str, Any]:
     """Return the present state of a stream in plain JSON types, for `generator` to restore it.
 
     Entropy, spawn key and number of spawned children identify a fresh stream; after a draw the state of the
-    bit generator is recorded too. Large integers are written as strings.
+    bit generator is recorded too. The words of the entropy are written as strings.
     """
     bits = rng.bit_generator
     seed, bit_generator = bits.seed_seq, type(bits)
     entry: dict[str, Any] = {"bit_generator": bit_generator.__name__, "entropy": None, "spawn_key": []}
     if not isinstance(seed, np.random.SeedSequence):
-        return entry | {"state": _plain(bits.state)}
+        return entry | {"state": _state(bits)}
     entropy = np.asarray(seed.entropy, dtype=object)
     words = [str(int(word)) for word in entropy.flat]
     entry["entropy"] = words if entropy.ndim else words[0]
     entry["spawn_key"] = [int(key) for key in seed.spawn_key]
     entry["children"] = int(seed.n_children_spawned)
-    state = _plain(bits.state)
-    if state != _plain(bit_generator(_seed(entry)).state):
-        entry["state"] = state
-    return entry
+    state = _state(bits)
+    return entry if state == _state(bit_generator(_seed(entry))) else entry | {"state": state}
 
 
 def _restored(entry: Mapping[str, Any]) -> np.random.Generator:
@@ -86,7 +85,7 @@ def _restored(entry: Mapping[str, Any]) -> np.random.Generator:
     bit_generator = getattr(np.random, entry["bit_generator"])
     bits = bit_generator(_seed(entry) if entry["entropy"] is not None else None)
     if "state" in entry:
-        bits.state = _numbers(entry["state"])
+        bits.state = entry["state"]
     return np.random.Generator(bits)
 
 
@@ -98,19 +97,6 @@ def _seed(entry: Mapping[str, Any]) -> np.random.SeedSequence:
     )
 
 
-def _plain(state: Any) -> Any:
-    """Return the state of a bit generator with its numbers as strings."""
-    if isinstance(state, Mapping):
-        return {key: _plain(value) for key, value in state.items()}
-    if isinstance(state, np.ndarray):
-        return [str(value) for value in state.tolist()]
-    return state if isinstance(state, str) else str(int(state))
-
-
-def _numbers(state: Any) -> Any:
-    """Undo `_plain`."""
-    if isinstance(state, Mapping):
-        return {key: _numbers(value) for key, value in state.items()}
-    if isinstance(state, list):
-        return np.array([int(value) for value in state], dtype=np.uint64)
-    return int(state) if state.isdigit() else state
+def _state(bits: Any) -> Any:
+    """Return the state of a bit generator with lists in place of arrays, which it takes as well."""
+    return json.loads(json.dumps(bits.state, default=np.ndarray.tolist))

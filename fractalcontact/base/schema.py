@@ -552,8 +552,10 @@ def in_cells(name: str) -> dict[str, str]:
     return {"units": "1", "comment": "in cells"} if quantity and quantity.units in ("m", "m2") else {}
 
 
-def label(data: T, *, keep_notes: bool = False) -> T:
-    """Return `data` with the labels of this table; of other attributes only the period of an axis is kept.
+def label(data: T) -> T:
+    """Return `data` with the labels of this table; of other attributes few are kept.
+
+    They are the period of an axis, `reason`, and of the variables of a Dataset `long_name` and `comment`.
 
     Parameters
     ----------
@@ -561,9 +563,6 @@ def label(data: T, *, keep_notes: bool = False) -> T:
         Every variable and coordinate is known to the table; a DataArray by its `name`. The coordinate of a
         dim may have a name of the user's own, and so may one of the rows of a table that is called after
         their dim (`island_seed`): it keeps its own units and meaning.
-    keep_notes : bool
-        Keep the attributes `long_name`, `comment` and `reason` of the variables of a Dataset, and `reason`
-        of its coordinates.
 
     Returns
     -------
@@ -581,27 +580,12 @@ def label(data: T, *, keep_notes: bool = False) -> T:
         if name not in QUANTITIES and _follows_dim(str(name), coordinate.dims):
             _label_own(str(name), coordinate)
         else:
-            attributes = coordinate.attrs
-            _label_variable(str(name), coordinate, is_coordinate=True)
-            if keep_notes and "reason" in attributes:
-                coordinate.attrs["reason"] = attributes["reason"]
-            if keep_notes and attributes.get("comment") == "in cells":
-                coordinate.attrs.update(in_cells(str(name)))
+            _label_variable(str(name), coordinate, ("reason",), is_coordinate=True)
     if not hasattr(data, "data_vars"):
-        _label_variable(str(data.name), data.variable, is_coordinate=False)
+        _label_variable(str(data.name), data.variable, (), is_coordinate=False)
         return data
-    for name, variable in data.variables.items():
-        if name in coordinates:
-            continue
-        attributes = variable.attrs
-        _label_variable(str(name), variable, is_coordinate=False)
-        if attributes:
-            notes = {key: attributes[key] for key in NOTES if keep_notes and key in attributes}
-            if attributes.get("units") in QUANTITIES[str(name)].other_units:
-                notes["units"] = attributes["units"]
-            if keep_notes and attributes.get("units") == "1":
-                notes |= in_cells(str(name)) | notes
-            variable.attrs.update(notes)
+    for name in data.variables.keys() - coordinates.keys():
+        _label_variable(str(name), data.variables[name], NOTES, is_coordinate=False)
     return data
 
 
@@ -616,14 +600,20 @@ def encoded(dataset: xr.Dataset) -> xr.Dataset:
     return dataset
 
 
-def _label_variable(name: str, variable: xr.Variable, *, is_coordinate: bool) -> None:
+def _label_variable(name: str, variable: xr.Variable, kept: tuple[str, ...], *, is_coordinate: bool) -> None:
+    """Label a variable; of its attributes some are kept, and units that it may state."""
     if name not in QUANTITIES:
         where = "`public_result(quantities=...)` of its function, or `base/schema.py`"
         raise KeyError(f"variable {name!r} has no unit: give it a Quantity in {where}")
-    attributes = QUANTITIES[name].labels.copy()
-    if name in CORE_DIMS and "period" in variable.attrs:
-        attributes["period"] = float(variable.attrs["period"])
-    variable.attrs = attributes
+    quantity, given = QUANTITIES[name], variable.attrs
+    attributes = quantity.labels.copy()
+    if name in CORE_DIMS and "period" in given:
+        attributes["period"] = float(given["period"])
+    if kept and given.get("units") == "1":
+        attributes |= in_cells(name)
+    if kept and given.get("units") in quantity.other_units:
+        attributes["units"] = given["units"]
+    variable.attrs = attributes | {key: given[key] for key in kept if key in given}
     variable.encoding = _encoding(variable, is_coordinate=is_coordinate)
 
 

@@ -112,12 +112,14 @@ def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
 
 def _strength_over_half(friction: xr.Dataset) -> float | None:
     """Return the greatest relative change of the strength between the two shortest distances."""
-    strengths = friction["secant_shear_strength"].sortby("distance").transpose("distance", ...).values
-    if len(strengths) < 2:
+    strengths = friction["secant_shear_strength"].sortby("distance")
+    if strengths.sizes["distance"] < 2:
         return None
     with np.errstate(divide="ignore", invalid="ignore"):
-        change = np.abs(strengths[0] / strengths[1] - 1.0)
-    return float(change[np.isfinite(change)].max()) if np.isfinite(change).any() else None
+        change = finite(
+            abs(strengths.isel(distance=0, drop=True) / strengths.isel(distance=1, drop=True) - 1.0)
+        )
+    return float(change.max()) if change.size else None
 
 
 def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
@@ -214,23 +216,13 @@ def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
         )
 
 
-def _in_turn(data: xr.Dataset, dim: str) -> Iterator[tuple[str, xr.Dataset]]:
-    """Yield the name of every value of a dim, nothing where there is no such dim, with its results."""
-    if dim not in data.coords:
-        yield "", data
-        return
-    values = np.atleast_1d(data[dim].values)
-    scale = scale_for("m", values) if values.dtype.kind == "f" else None
-    for place, value in enumerate(values):
-        state = data.isel({dim: place}) if dim in data.dims else data
-        yield scale.text(value) if scale is not None else str(value), state
-
-
 def _uplift_remarks(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield whether the joint has more or less uplift than the guidelines assume."""
-    for shear, state in _in_turn(data, "shear"):
+    for index in range(data.sizes.get("shear", 1)):
+        state, place = data.isel(shear=index, missing_dims="ignore"), ""
+        if "shear" in state.coords:
+            place = f"at shear {scale_for('m', data['shear'].values).text(state['shear'])}: "
         joint, arm = (state[name].sel(diagram="joint") for name in ("uplift_force", "uplift_arm"))
-        place = f"at shear {shear}: " if shear else ""
         if not np.isfinite(joint.values).all():
             yield f"{place}no effective stress on the path of the closure balances the total stress"
             continue

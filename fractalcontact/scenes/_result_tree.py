@@ -202,7 +202,7 @@ def tree_of_scans(scene: Scene, reasons: Mapping[str, str], numbers: Mapping[str
     overview["status"] = (SCAN, [done.get(name, "failed") for name in reasons])
     overview["reason"] = (SCAN, list(reasons.values()), {"long_name": "why it failed"})
     overview["caveats"] = (SCAN, ["" if text == "none" else text for text in found])
-    groups[OVERVIEW] = schema.label(overview, keep_notes=True)
+    groups[OVERVIEW] = schema.label(overview)
     stages = (provenance_of(each[""]).get("stages", {}).items() for each in numbers.values())
     seconds = total_seconds({name: facts["run_time"] for name, facts in each} for each in stages)
     tree = result_tree(scene, StudyResults(groups, seconds), pooled(main))

@@ -323,8 +323,6 @@ def _no_interval(tree: xr.DataTree) -> Iterator[str]:
 
 def _spikes(tree: xr.DataTree) -> Iterator[str]:
     """Yield how many points of the scans stand out from all around them, and what they do to the results."""
-    counts: dict[str, int] = {}
-    heights: dict[str, xr.DataArray] = {}
     clean: dict[str, xr.DataArray] = {}
     for name, path in (("surface", "surfaces"), ("upper", "joints/faces")):
         data, table = group_of(tree, path), _table(tree, name)
@@ -335,17 +333,12 @@ def _spikes(tree: xr.DataTree) -> Iterator[str]:
             continue
         from fractalcontact import surfaces  # only for scans that were not despiked
 
-        heights[name] = data["height"]
-        clean[name] = surfaces.despike(heights[name])
-        counts[name] = int(clean[name]["removed_points"])
-    if not sum(counts.values()):
-        return
-    effects: list[str] = []
-    if counts.get("surface"):
-        effects += _without_spikes(tree, clean["surface"])
-    effects += _lift_of_spikes(tree, clean)
+        clean[name] = surfaces.despike(data["height"])
+    counts = {name: int(each["removed_points"]) for name, each in clean.items() if each["removed_points"]}
+    effects = list(_without_spikes(tree, clean["surface"])) if "surface" in counts else []
+    effects += _lift_of_spikes(tree, clean) if counts else []
     if effects:
-        points = " and ".join(f"{count} of [{name}]" for name, count in counts.items() if count)
+        points = " and ".join(f"{count} of [{name}]" for name, count in counts.items())
         without = ", ".join(effects)
         yield f"points that stand out as spikes of a scan: {points}; without them {without} (--despike)."
 
