@@ -6,7 +6,6 @@ Nothing here needs xarray, so that the command starts fast.
 from __future__ import annotations
 
 import os
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.files import DAMAGED, NETCDF_LOCK, require_checksum
 from fractalcontact.base.study import provenance_of
-from fractalcontact.base.tables import note, screen_width, table
+from fractalcontact.base.tables import note, table
 from fractalcontact.base.validation import Problems, reading
 
 SHARED = "parts that ran at the same time are each counted in full, so that all stages exceed the total"
@@ -178,18 +177,13 @@ def _phrases(facts: dict[str, Any]) -> Iterable[str]:
 
 def _variable_lines(group: Header) -> Iterable[str]:
     """Yield name, dims, long name and units of every variable, in columns."""
-    rows = []
+    rows: list[tuple[str, ...]] = [("variable", "dims", "meaning")]
     for name, (sizes, attributes) in group.variables.items():
         dims = ", ".join(f"{dim} {size}" for dim, size in sizes.items())
         units = attributes.get("units", "")
         unit = "" if units in ("", "1") else f" [{units}]"
         rows.append((name, f"({dims})" if dims else "", f"{attributes.get('long_name', '')}{unit}"))
-    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
-    for name, dims, words in rows:
-        line = f"  {name:<{widths[0]}}  {dims:<{widths[1]}}  {words}".rstrip()
-        # 6 blanks between the columns, but no more than half a line
-        indent = " " * min(6 + widths[0] + widths[1], screen_width() // 2)
-        yield from textwrap.wrap(line, screen_width(), subsequent_indent=indent)
+    yield table(rows)
 
 
 def _is_achieved(name: str) -> bool:

@@ -47,7 +47,7 @@ FLAG_COLOURS = {
     "stick": "#0b5394",
     "slip": "#e69f00",
 }
-OTHER_COLOURS = ("#009e73", "#cc79a7", "#56b4e9", "#f0e442")
+OTHER_COLOUR = "#009e73"
 LOADS = {"normal_force": "F", "nominal_pressure": "p", "closure": "w", "tangential_force": "Q"}
 PLAIN_LIST = re.compile(r"\[[^\[\]{}\"]*\]")  # in JSON: of numbers, without words, lists or objects
 HIDDEN = ("run_time", "iterations", "stop_reason")  # from the tables on the page
@@ -146,8 +146,7 @@ def write_report(
 def _page(tree: xr.DataTree, figures: Iterable[tuple[str, bytes]], summary: Summary, target: Path) -> str:
     """Return the text of the page."""
     overview, scene, single = group_of(tree, OVERVIEW), scene_of(tree), of_member(tree, 0)
-    surface, maps = _surface(single), list(_maps(single))
-    curves = [_curve_table(name, frame) for name, frame in _curves(tree).items()]
+    frames = {name: frame for name, frame in tables(tree).items() if {*frame.columns} != {"run_time (s)"}}
     scans = [] if overview is None else map(str, overview[SCAN].values)
     pages = {name: page for name in scans if (target.parent / (page := page_of(name))).is_file()}
     written = str(tree.attrs.get("history", "")).split(" ")[0]
@@ -167,9 +166,9 @@ def _page(tree: xr.DataTree, figures: Iterable[tuple[str, bytes]], summary: Summ
         scene=_as_json(scene) if scene else "",
         provenance=_as_json(provenance_of(tree)),
         references=str(tree.attrs.get("references", "")),
-        surface=surface,
-        maps=maps,
-        curves=curves,
+        surface=_surface(single),
+        maps=list(_maps(single)),
+        curves=[_curve_table(name, frame) for name, frame in frames.items()],
     )
 
 
@@ -229,7 +228,10 @@ def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most:
     shown = {dim: spread_indices(state.sizes[dim], limit) for dim in dims}
     dataset = dataset.isel(shown)
     state = dataset[name]
-    key = _key(state)
+    key = {
+        meaning: FLAG_COLOURS.get(meaning, OTHER_COLOUR)
+        for meaning in str(state.attrs["flag_meanings"]).split()
+    }
     block = math.ceil(max(state.shape[-2:]) / 400)  # the page shows a map 512 pixels wide
     palette = list(key.values())
     pictures, alternatives = [], []
@@ -302,13 +304,6 @@ def _signature_view(tree: xr.DataTree, signature: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _key(state: xr.DataArray) -> dict[str, str]:
-    """Return the colour of every flag by its meaning."""
-    spare = iter(OTHER_COLOURS * 4)
-    meanings = str(state.attrs["flag_meanings"]).split()
-    return {meaning: FLAG_COLOURS.get(meaning) or next(spare) for meaning in meanings}
-
-
 def _picture(flags: Array, palette: Sequence[str], block: int) -> str:
     """Return a map as PNG in base64, y upwards; a block has the highest flag among its cells."""
     from PIL import Image
@@ -321,7 +316,7 @@ def _picture(flags: Array, palette: Sequence[str], block: int) -> str:
     picture.putpalette([int(colour[i : i + 2], 16) for colour in palette for i in (1, 3, 5)])
     content = io.BytesIO()
     # a higher level saves a fifth of some kilobytes, in ten times the time
-    picture.save(content, "PNG", compress_level=4, bits=2 if len(palette) <= 4 else 4)
+    picture.save(content, "PNG", compress_level=4)
     return base64.b64encode(content.getvalue()).decode()
 
 
@@ -369,12 +364,6 @@ def _picture_file(path: Path) -> tuple[str, bytes]:
         # a greater effort (method) saves a tenth, in three times the time
         picture.convert("RGB").save(content, "WEBP", quality=85, method=0)
     return path.stem, content.getvalue()
-
-
-def _curves(tree: xr.DataTree) -> dict[str, Any]:
-    """Return the curves of a study as tables, without those that hold run times alone."""
-    frames = tables(tree).items()
-    return {name: frame for name, frame in frames if not set(frame.columns) <= {"run_time (s)"}}
 
 
 def _curve_table(name: str, frame: Any, most: int = 100) -> dict[str, Any]:

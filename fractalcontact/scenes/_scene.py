@@ -128,7 +128,6 @@ class Scene:
     name: str
     tables: Table
     folder: Path
-    checked: Table | None = field(default=None, compare=False)  # a copy of the tables that were valid
 
     def __repr__(self) -> str:
         """Return the name, then each table on a line."""

@@ -6,7 +6,6 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
@@ -70,7 +69,7 @@ def load(path: str | os.PathLike[str]) -> Scene:
     scene, problems = parse(path)
     if problems.messages:
         raise InvalidInput(problems.where, problems.messages)
-    return replace(scene, checked=deepcopy(scene.tables))
+    return scene
 
 
 def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
@@ -106,8 +105,6 @@ def check_tables(scene: Scene) -> tuple[Scene, Problems]:
     In place of what is no table it has an empty one, so that the problems of the others are listed too.
     """
     problems = Problems(f"scene {scene.name}")
-    if scene.checked is not None and scene.checked == scene.tables:
-        return scene, problems  # the check loads every function whose arguments the tables may name
     if _is_too_deep(scene.tables):
         raise InvalidInput(problems.where, [TOO_DEEP])
     tables = {key: _in_plain_words(value, key, key, problems) for key, value in scene.tables.items()}
@@ -337,9 +334,7 @@ def scans_of(scene: Scene) -> dict[str, Scene]:
         for pair in pairs
     ]
     return {
-        name: replace(
-            scene, name=folder_of(name), tables={**scene.tables, "title": name, **own}, checked=None
-        )
+        name: replace(scene, name=folder_of(name), tables={**scene.tables, "title": name, **own})
         for name, own in zip(names, tables, strict=True)
     }
 
