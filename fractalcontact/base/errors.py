@@ -16,7 +16,7 @@ class InvalidInput(FractalContactError, ValueError):
     Attributes
     ----------
     where : str
-        The public name that was called, or the file that was read.
+        The public name that was called, or the file that was read; empty until `base.results` knows it.
     problems : tuple of str
         One line for each problem: the argument, what was expected, what was given.
     """
@@ -25,6 +25,10 @@ class InvalidInput(FractalContactError, ValueError):
         self.where = where
         self.problems = tuple(problems)
         super().__init__(where, self.problems)
+
+    def __reduce__(self) -> tuple[type[Exception], tuple[str, Sequence[str]]]:
+        """Return what pickle makes the error again from, in another process."""
+        return type(self), (self.where, self.problems)
 
     def __str__(self) -> str:
         """Return a line for each problem."""

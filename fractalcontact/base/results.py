@@ -149,7 +149,7 @@ def public_result(
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
-            with _memory_errors(name):
+            with _named_errors(name):
                 bound, done = checked(arguments, options)
                 if not in_blocks:
                     announce_loading(name, bound.arguments)
@@ -175,7 +175,7 @@ def public_result(
             return with_load_indexes(result)
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
-            with _memory_errors(name):
+            with _named_errors(name):
                 checked(arguments, options)
 
         public = cast("PublicFunction[P, R]", call)
@@ -237,11 +237,12 @@ def _size_of(arguments: Mapping[str, Any]) -> str:
 
 
 @contextmanager
-def _memory_errors(name: str) -> Iterator[None]:
-    """Turn a MemoryError in the block into an error of the package, in words."""
+def _named_errors(name: str) -> Iterator[None]:
+    """Name the function in the errors of the block that have no name; put a MemoryError into words."""
     try:
         yield
-    except TooLittleMemory:
+    except InvalidInput as error:
+        error.where = error.where or name
         raise
     except MemoryError as error:
         got = str(error) or "a request that the system refused"

@@ -343,6 +343,12 @@ class Problems:
         return self.require(allowed, "periodic", expected, value)
 
 
+def require(condition: bool, argument: str, expected: str, got: object = NONE) -> None:
+    """Raise `InvalidInput` unless `condition` holds; `public_result` names the function that was called."""
+    with Problems("") as problems:
+        problems.require(condition, argument, expected, got)
+
+
 @contextmanager
 def reading(where: str, path: str | PathLike[str]) -> Iterator[None]:
     """Raise `UnreadableFile` for an error of the file system in the block: no permission, a bad disk."""

@@ -20,8 +20,6 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, check_pressing, pressed_dataset
 
-WHERE = "fractalcontact.joints.area_by_resolution"
-
 
 def _check(problems: Problems) -> None:
     crack, factors = problems.given.crack, problems.given.factors
@@ -117,7 +115,7 @@ def area_by_resolution(
     towards, shears = read_direction(direction), float_array(shear)
     loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
     pressing = Pressing.read(
-        crack, WHERE, loads, influence=influence, hardness=hardness, tolerance=tolerance, keep=("state",)
+        crack, loads, influence=influence, hardness=hardness, tolerance=tolerance, keep=("state",)
     )
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
     pressed = []

@@ -23,7 +23,6 @@ from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, che
 
 Path = float | Sequence[float] | Array
 
-WHERE = "fractalcontact.joints.closure"
 UNDETERMINED = (
     "NaN where periodic faces are closed to the mean plane of the delta-surface or beyond: "
     "no force is then determined"
@@ -110,7 +109,6 @@ def closure(
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
     pressing = Pressing.read(
         crack,
-        WHERE,
         loads,
         bulk=bulk,
         keep=keep,

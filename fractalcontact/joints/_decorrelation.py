@@ -28,7 +28,6 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, missing_heights
 
-WHERE = "fractalcontact.joints.decorrelation_length"
 THRESHOLD = math.exp(-1.0)  # correlation, over that at no shear, that defines the decorrelation length
 
 # tiles along an edge of the block; on eight intervals 6 and 3 changed the width by .66 to 1.9 times, 12 and 4
@@ -165,7 +164,7 @@ def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[TileSu
     residuals = [_without_rounding(detrended(face, order)[0], face) for face in heights]
     sums, variance = tile_sums(residuals[0], residuals[-1][layout.slices], layout, shears, towards.unit)
     if not np.isfinite(variance).all():
-        raise missing_heights(WHERE, crack, towards, float(shears[~np.isfinite(variance)][0]))
+        raise missing_heights(crack, towards, float(shears[~np.isfinite(variance)][0]))
     return sums, variance
 
 

@@ -28,10 +28,9 @@ from fractalcontact.base.numbers import Array, float_array, is_within
 from fractalcontact.base.regression import fitted_slope, rounding_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.study import PAPER
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, Words, require
 from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords, check_sliding
 
-WHERE = "fractalcontact.joints.delta_surface"
 DEGREE = 5  # of the spline; 3 and 7 change the heights of a fractal face by 2 and 1 % of their greatest
 
 
@@ -85,7 +84,7 @@ def delta_surface(
     heights = np.empty((len(directions), shears.size, *crack.layout.cells))
     for i, towards in enumerate(directions):
         for j, v in enumerate(shears):
-            heights[i, j] = delta_heights(crack, float(v), towards, WHERE)
+            heights[i, j] = delta_heights(crack, float(v), towards)
     coords: dict[str, Any] = {
         "shear": ("shear", shears),
         **block_coords(crack),
@@ -100,24 +99,23 @@ def delta_surface(
     return result
 
 
-def delta_heights(crack: Crack, shear: float, direction: Direction, where: str) -> Array:
+def delta_heights(crack: Crack, shear: float, direction: Direction) -> Array:
     """Return the heights of one delta-surface, shape (y, x) of the block."""
     lower, upper = crack.faces()
     under = heights_under(lower, crack.layout, crack.layout.shift(shear, direction.unit))
     heights = np.asarray(under - upper)
     if not np.isfinite(heights).all():
-        raise missing_heights(where, crack, direction, shear)
+        raise missing_heights(crack, direction, shear)
     return heights
 
 
-def missing_heights(where: str, crack: Crack, direction: Direction, shear: float) -> InvalidInput:
+def missing_heights(crack: Crack, direction: Direction, shear: float) -> InvalidInput:
     """Return the error for heights that are missing in the path of the block."""
     under = heights_under(crack.faces()[0], crack.layout, crack.layout.shift(shear, direction.unit))
     count = int(np.count_nonzero(~np.isfinite(under)))
     expected = f"crack.lower: expected finite heights under the block ({FILL})"
-    return InvalidInput(
-        where, [f"{expected}, got {count} missing at a shear of {shear:g} m towards {direction.name}"]
-    )
+    got = f"{count} missing at a shear of {shear:g} m towards {direction.name}"
+    return InvalidInput("", [f"{expected}, got {got}"])
 
 
 def interpolation_errors(crack: Crack, shears: Array, directions: Sequence[Direction]) -> Array:
@@ -385,7 +383,5 @@ def _slope(scale: xr.DataArray, value: xr.DataArray, window: Window) -> float:
     lengths = np.asarray(scale.values, dtype=float)
     inside = is_within(lengths, *window)
     count = int(inside.sum())
-    if count < 2:
-        problem = f"window: expected at least two scales of the block, got {count} in {window}"
-        raise InvalidInput("fractalcontact.joints.delta_dimension", [problem])
+    require(count >= 2, "window", "at least two scales of the block", Words(f"{count} in {window}"))
     return fitted_slope(lengths[inside], np.asarray(value.values, dtype=float)[inside])

@@ -26,8 +26,6 @@ from fractalcontact.joints._sheared_contact import (
     pressed_dataset,
 )
 
-WHERE = "fractalcontact.joints.dilatancy"
-
 
 def _check(problems: Problems) -> None:
     given = problems.given
@@ -123,7 +121,6 @@ def dilatancy(
     load, spring = {"normal_force": normal_force}, None
     pressing = Pressing.read(
         crack,
-        WHERE,
         load,
         bulk=bulk,
         keep=keep,
@@ -148,7 +145,7 @@ def dilatancy(
 
 
 def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction]) -> xr.Dataset:
-    lifted, initial = rigid_dilatancies(crack, shears, directions, WHERE)
+    lifted, initial = rigid_dilatancies(crack, shears, directions)
     slope_y, slope_x = mean_slopes(crack.faces()[0], crack.layout)
     mean_slope = np.array([slope_y * towards.unit[0] + slope_x * towards.unit[1] for towards in directions])
     dims = ("direction", "shear")
@@ -166,16 +163,14 @@ def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction])
     )
 
 
-def rigid_dilatancies(
-    crack: Crack, shears: Array, directions: Sequence[Direction], where: str
-) -> tuple[Array, float]:
+def rigid_dilatancies(crack: Crack, shears: Array, directions: Sequence[Direction]) -> tuple[Array, float]:
     """Return the rigid dilatancy, shape (direction, shear), and the separation that it counts from, m."""
     initial = separations(*crack.faces(), crack.layout, np.zeros(1), (0.0, 1.0))[0]
     highest = np.empty((len(directions), shears.size))
     for row, towards in zip(highest, directions, strict=True):
         row[:] = separations(*crack.faces(), crack.layout, shears, towards.unit)
         if not np.isfinite(row).all():
-            raise missing_heights(where, crack, towards, float(shears[~np.isfinite(row)][0]))
+            raise missing_heights(crack, towards, float(shears[~np.isfinite(row)][0]))
     return highest - initial, float(initial)
 
 

@@ -175,7 +175,6 @@ def direct_shear(
     load = {"nominal_pressure": nominal_pressure}
     pressing = Pressing.read(
         crack,
-        WHERE,
         load,
         influence=influence,
         disc_radius=disc_radius,

@@ -78,7 +78,7 @@ def pressures(
     matrix = (diags_array(diagonal) - links - links.T).tocsr()
     even = even_gradient(network.shape, axis)
     balance = Balance(i, j, conductance, network.jump[chosen], to_held, level)
-    scale, possible = float(np.linalg.norm(balance.surplus(np.zeros(size)))) or 1.0, balance.possible
+    scale = float(np.linalg.norm(balance.surplus(np.zeros(size)))) or 1.0
     p, most = even.ravel()[inside], dissipation(network, even, inside, held)
     if np.linalg.norm(balance.surplus(p)) > 1e-14 * scale:  # less where all cells are open alike
         unknown = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
@@ -86,24 +86,14 @@ def pressures(
         sequence = (np.cumsum(unknown) - 1)[sequence[unknown[sequence]]]
         system = System(matrix[unknown][:, unknown], unknown, balance, most, scale)
         p = _solve(system, p, sequence, largest_direct)
-    missed = possible.missed_by(p)
-    p = np.clip(p, possible.low, possible.high)  # what this moves is part of the error
+    missed = balance.beyond_range(p)
+    p = balance.within_range(p)  # what this moves is part of the error
     error = max(float(np.linalg.norm(balance.surplus(p))) / scale, missed)
     pressure = np.zeros(inside.size)
     pressure[inside] = p
     pressure = pressure.reshape(network.shape)
     flow = dissipation(network, pressure, inside, held)
     return pressure, max(error, flow / most - 1.0) if most > 0 else error
-
-
-class Range(NamedTuple):
-    """The pressures that are held; all others lie between them."""
-
-    low: float
-    high: float
-
-    def missed_by(self, p: Array) -> float:
-        return float(max(p.max() - self.high, self.low - p.min(), 0.0))
 
 
 class Balance(NamedTuple):
@@ -126,11 +116,14 @@ class Balance(NamedTuple):
         links = np.bincount(self.j, flow, p.size) - np.bincount(self.i, flow, p.size)
         return np.asarray(links + self.held * (self.level - p))
 
-    @property
-    def possible(self) -> Range:
-        """The range of the held pressures; without any, all pressures are possible."""
+    def within_range(self, p: Array) -> Array:
+        """Return pressures cut to the range of the held ones, between which all others lie."""
         levels = self.level[self.held > 0]
-        return Range(float(levels.min()), float(levels.max())) if levels.size else Range(-math.inf, math.inf)
+        return np.clip(p, levels.min(), levels.max()) if levels.size else p
+
+    def beyond_range(self, p: Array) -> float:
+        """Return by how much a pressure lies beyond those that are held."""
+        return float(np.abs(p - self.within_range(p)).max())
 
 
 class System(NamedTuple):
@@ -255,8 +248,7 @@ def _conjugate_gradients(
     max_iterations : int
         Then elimination takes over; rough faces of 700 x 700 cells took 11.
     """
-    b, possible = system.balance.surplus(start)[system.unknown], system.balance.possible
-    p = start.copy()
+    p, b = start.copy(), system.balance.surplus(start)[system.unknown]
     x, r = np.zeros(b.size), b.copy()
     t, previous = np.zeros(b.size), 1.0
     for _ in range(max_iterations):
@@ -266,7 +258,7 @@ def _conjugate_gradients(
         flow = max(system.power - float(b @ x), flow_error * system.power)  # none where no path crosses
         is_balanced &= r_z <= flow_error * flow
         p[system.unknown] = start[system.unknown] + x
-        if is_balanced and possible.missed_by(p) <= tolerance:
+        if is_balanced and system.balance.beyond_range(p) <= tolerance:
             return p
         t = z + (r_z / previous) * t
         a_t = system.matrix @ t

@@ -141,9 +141,7 @@ def partial_slip(
     towards, shears, names = read_direction(direction), float_array(shear), word_tuple(keep)
     path = _shear_path(crack, tangential_force, direction, friction_coefficient, method)
     loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    pressing = Pressing.read(
-        crack, WHERE, loads, influence=influence, disc_radius=disc_radius, tolerance=tolerance
-    )
+    pressing = Pressing.read(crack, loads, influence=influence, disc_radius=disc_radius, tolerance=tolerance)
     rows = [
         _pushed(ShearedContact.of_crack(pressing, float(value), towards), path, names)
         for value in track(shears, progress, "partial_slip", unit="shear")

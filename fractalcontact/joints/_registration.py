@@ -19,7 +19,7 @@ from fractalcontact.base.errors import ConvergenceWarning, InvalidInput, warn
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import NONE, Problems, Words, require
 
 Pair = tuple[float, float]
 
@@ -127,9 +127,8 @@ def register(
     pose = find_pose(low, up, offset, rotation, tilt)
     if not pose.is_certain:
         _refuse_turned_face(low, scanned, turn_upper, offset, rotation, tilt)
-    if not pose.determined:
-        expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
-        raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got nothing that fixes the position"])
+    expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
+    require(pose.determined, "lower, upper", expected, Words("nothing that fixes the position"))
     moved = resample(up, source_places(pose, low.shape, offset))
     y, x = np.indices(low.shape, dtype=float)
     tilt_plane = pose.slope[0] * y + pose.slope[1] * x
@@ -160,7 +159,7 @@ def _refuse_turned_face(
             problem = "upper: expected faces seen from above, got one scanned face up"
             if given is not None:
                 problem = f"turn_upper: expected another way to turn the upper body, got {given!r}"
-            raise InvalidInput(WHERE, [f"{problem}: it fits {remedy}"])
+            raise InvalidInput("", [f"{problem}: it fits {remedy}"])
 
 
 def _refuse_swapped_faces(result: xr.Dataset, overlap: float = 0.5) -> None:
@@ -173,12 +172,12 @@ def _refuse_swapped_faces(result: xr.Dataset, overlap: float = 0.5) -> None:
     lift = sum(
         abs(float(result[f"tilt_{dim}"])) * float(np.ptp(result[dim].values)) / 2 for dim in ("x", "y")
     )
-    if mean < -overlap * mismatch - lift - UNIFORM * float(np.abs(result["height"]).max()):
-        expected = (
-            "an upper face above the lower one (swap lower and upper; if each was scanned with a zero of its "
-            "own, raise upper by the aperture)"
-        )
-        raise InvalidInput(WHERE, [f"lower, upper: expected {expected}, got a mean aperture of {mean:.3g} m"])
+    lowest = -overlap * mismatch - lift - UNIFORM * float(np.abs(result["height"]).max())
+    expected = (
+        "an upper face above the lower one (swap lower and upper; if each was scanned with a zero of its "
+        "own, raise upper by the aperture)"
+    )
+    require(not mean < lowest, "lower, upper", expected, Words(f"a mean aperture of {mean:.3g} m"))
 
 
 def _dataset(lower: xr.DataArray, low: Array, moved: Array, pose: Pose, grid: Grid) -> xr.Dataset:
@@ -380,17 +379,12 @@ def _refine(
     used = [0, 1] + ([2] if rotates else []) + [3] + ([4, 5] if tilts else [])
     first = pose.iterations + 1
     for iteration in range(first, first + max_steps):
-        system = _normal_equations(pose, lower, upper, gradients, offset, edge)
-        matrix = system.matrices.sum(axis=0)[np.ix_(used, used)]
-        if not _has_full_rank(matrix):
+        equations = _normal_equations(pose, lower, upper, gradients, offset, edge, used)
+        solved = _newton_step(*equations, used)
+        if solved is None:
             return replace(pose, determined=False)
-        step = np.zeros(6)
-        step[used] = np.linalg.solve(matrix, system.vectors.sum(axis=0)[used])
+        step, errors = solved
         step[:3] *= 1.0 if iteration - first < full_steps else 0.25  # .125 and .5 converged as well
-        try:
-            errors = _jackknife_errors(system, used)
-        except np.linalg.LinAlgError:  # one tile alone determines the position
-            return replace(pose, determined=False)
         settled = np.abs(step[:3]).max() <= max(small_step, settled_step * float(np.nanmin(errors)))
         pose = Pose(
             shift=(pose.shift[0] + step[0], pose.shift[1] + step[1]),
@@ -405,18 +399,6 @@ def _refine(
     return pose
 
 
-@dataclass(frozen=True)
-class NormalEquations:
-    """Weighted normal equations of every tile, shapes (tiles, 6, 6) and (tiles, 6).
-
-    `error_factor` corrects the standard errors for the robust weights, which change with the residuals.
-    """
-
-    matrices: Array
-    vectors: Array
-    error_factor: float
-
-
 def _normal_equations(
     pose: Pose,
     lower: Array,
@@ -424,9 +406,13 @@ def _normal_equations(
     gradients: Any,
     offset: Pair,
     edge: float,
+    used: list[int],
     side: int = 6,  # tiles along an edge; the standard errors change by .4 with 4 and by .15 with 9
-) -> NormalEquations:
-    """Return the equations for the step that brings the difference of the faces to zero.
+) -> tuple[Array, Array, float]:
+    """Return the equations for the step that brings the difference of the faces to zero, of every tile.
+
+    They are weighted, of shapes (tiles, used, used) and (tiles, used). The last number corrects the standard
+    errors for the robust weights, which change with the residuals.
 
     The gradients of the upper face share the noise of the difference, and least squares on them alone would
     be biased. They form the columns; the gradients of the lower face are the instruments that multiply them.
@@ -442,13 +428,13 @@ def _normal_equations(
     weights, error_factor = _robust_weights(columns, target)
     rows_of, columns_of = (np.arange(n) * side // n for n in lower.shape)
     tile, tiles = (rows_of[:, None] * side + columns_of)[observed], side * side
-    matrices, vectors = np.empty((tiles, 6, 6)), np.empty((tiles, 6))
-    for i, instrument in enumerate(instruments):
+    matrices, vectors = np.empty((tiles, len(used), len(used))), np.empty((tiles, len(used)))
+    for i, instrument in enumerate(instruments[used]):
         weighted = instrument * weights
         vectors[:, i] = np.bincount(tile, weighted * target, tiles)
-        for j, column in enumerate(columns):
+        for j, column in enumerate(columns[used]):
             matrices[:, i, j] = np.bincount(tile, weighted * column, tiles)
-    return NormalEquations(matrices, vectors, error_factor)
+    return matrices, vectors, error_factor
 
 
 def _columns(pose: Pose, gy: Array, gx: Array, edge: float) -> Array:
@@ -484,17 +470,23 @@ def _has_full_rank(matrix: Array, least: float = 1e-9) -> bool:
     return bool(np.linalg.svd(matrix / np.outer(scale, scale), compute_uv=False)[-1] > least)
 
 
-def _jackknife_errors(system: NormalEquations, used: list[int]) -> Array:
-    """Return the standard errors of shift y, shift x and angle, from leaving out one tile at a time."""
-    block = np.ix_(used, used)
-    matrix, vector = system.matrices.sum(axis=0), system.vectors.sum(axis=0)
-    estimates = np.array(
-        [
-            np.linalg.solve((matrix - tile_matrix)[block], (vector - tile_vector)[used])
-            for tile_matrix, tile_vector in zip(system.matrices, system.vectors, strict=True)
-            if tile_matrix.any()
-        ]
-    )
-    errors = np.full(6, np.nan)
-    errors[used] = np.sqrt((len(estimates) - 1) * estimates.var(axis=0)) * system.error_factor
-    return errors[:3]
+def _newton_step(
+    matrices: Array, vectors: Array, error_factor: float, used: list[int]
+) -> tuple[Array, Array] | None:
+    """Return the step, and standard errors of shift y, shift x and angle from leaving out one tile at a time.
+
+    None where the tiles, or those without one of them, do not determine the position.
+    """
+    matrix, vector = matrices.sum(axis=0), vectors.sum(axis=0)
+    if not _has_full_rank(matrix):
+        return None
+    observed = matrices.any(axis=(1, 2))
+    others = (vector - vectors[observed])[..., None]
+    try:
+        estimates = np.linalg.solve(matrix - matrices[observed], others)[..., 0]
+    except np.linalg.LinAlgError:
+        return None
+    step, errors = np.zeros(6), np.full(6, np.nan)
+    step[used] = np.linalg.solve(matrix, vector)
+    errors[used] = np.sqrt((len(estimates) - 1) * estimates.var(axis=0)) * error_factor
+    return step, errors[:3]

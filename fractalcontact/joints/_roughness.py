@@ -17,8 +17,6 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.joints._criteria import LARGEST_JRC, SAMPLE_LENGTH, scaled_roughness
 
-WHERE = "fractalcontact.joints.roughness_coefficient"
-
 
 class Regression(NamedTuple):
     """JRC = offset + factor f(Z2) of readings one interval (m) apart; f is log10 without a power."""
@@ -161,7 +159,7 @@ def roughness_coefficient(
     interval = _lag_or_default(lag, regression)
     heights = detrended(np.asarray(surface.values, dtype=np.float64), 1)[0]
     rows, limits = [], np.full((2, len(directions)), np.nan)
-    with Problems(WHERE) as problems:
+    with Problems("") as problems:
         for i, towards in enumerate(directions):
             lines = _profile_slopes(heights, grid.spacing, towards, interval)
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / lines.lag)))

@@ -1,6 +1,6 @@
 """A sheared crack that is pressed: its delta-surface between the two bodies, on plain arrays.
 
-    pressing = Pressing.read(crack, WHERE, {"normal_force": [10.0, 100.0]}, keep="state", hardness=2e9)
+    pressing = Pressing.read(crack, {"normal_force": [10.0, 100.0]}, keep="state", hardness=2e9)
     columns = press_sheared(pressing, shears, towards, progress=False)
     columns["interface_closure"], columns["state"]  # of shape (shear, step) and (shear, step, y, x)
 
@@ -55,7 +55,6 @@ class Pressing:
     """
 
     crack: Crack
-    where: str
     load: LoadPath
     options: ContactOptions
     bulk: str = "flat_block"
@@ -66,7 +65,6 @@ class Pressing:
     def read(
         cls,
         crack: Crack,
-        where: str,
         loads: Mapping[str, Any],
         *,
         bulk: str = "flat_block",
@@ -77,7 +75,7 @@ class Pressing:
         from fractalcontact.contact.solver import ContactOptions, LoadPath
 
         options = ContactOptions(_boundary(crack), **contact_options)
-        return cls(crack, where, LoadPath.among(loads), options, bulk, word_tuple(keep))
+        return cls(crack, LoadPath.among(loads), options, bulk, word_tuple(keep))
 
     @property
     def references(self) -> str:
@@ -160,7 +158,7 @@ class ShearedContact:
     @classmethod
     def of_crack(cls, pressing: Pressing, shear: float, towards: Direction) -> ShearedContact:
         """Return that of the crack at a shear."""
-        heights = delta_heights(pressing.crack, shear, towards, pressing.where)
+        heights = delta_heights(pressing.crack, shear, towards)
         return cls(pressing, heights[:: pressing.factor, :: pressing.factor], shear, towards)
 
     def press(self, load: LoadPath, keep: Sequence[str] = ()) -> Columns:
@@ -196,12 +194,12 @@ class ShearedContact:
         pressing, height_range = self.pressing, float(np.ptp(self.heights))
         problem = pressing.modulus, pressing.options, load
         try:
-            with Problems(pressing.where) as problems:
+            with Problems("") as problems:
                 check_scale(problems, pressing.grid, height_range, *problem)
             return solve(self.heights, pressing.grid, *problem, *path, keep=keep)
         except InvalidInput as error:
             lines = [f"{line} ({self.place})" for line in error.problems]
-            raise InvalidInput(pressing.where, lines) from error
+            raise InvalidInput("", lines) from error
 
 
 class Spring(NamedTuple):
@@ -248,7 +246,7 @@ def press_sheared(
             rows.append(columns)
         by_direction.append(stacked(rows))
     columns = stacked(by_direction)
-    solver.warn_steep(f"{pressing.where}: the delta-surface", float(columns["rms_slope"].max()))
+    solver.warn_steep("fractalcontact.joints: the delta-surface", float(columns["rms_slope"].max()))
     return columns
 
 

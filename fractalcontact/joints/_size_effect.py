@@ -28,7 +28,6 @@ from fractalcontact.joints._sheared_contact import (
     press_sheared,
 )
 
-WHERE = "fractalcontact.joints.self_weight"
 USED_OPTIONS = ("influence", "hardness", "tolerance")
 MEAN_ANGLE = "basic friction angle plus the mean dilatancy angle from zero shear to this one"
 RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and no load closes it"
@@ -131,15 +130,13 @@ def self_weight(
     """
     sizes, shears, directions = float_array(structure_size), float_array(shear), read_directions(direction)
     pressures, dims = float(unit_weight) * sizes, ("direction", "shear", "structure_size")
-    lifted, _ = rigid_dilatancies(crack, shears, directions, WHERE)
+    lifted, _ = rigid_dilatancies(crack, shears, directions)
     opening = np.repeat(lifted[..., None], sizes.size, axis=-1)
     variables: dict[str, Any] = {}
     attributes: dict[str, Any] = {"references": PAPER}
     if not _is_rigid(crack):
         forces = {"normal_force": pressures * crack.nominal_area}
-        pressing = Pressing.read(
-            crack, WHERE, forces, influence=influence, hardness=hardness, tolerance=tolerance
-        )
+        pressing = Pressing.read(crack, forces, influence=influence, hardness=hardness, tolerance=tolerance)
         columns = press_sheared(pressing, shears, directions)
         opening -= columns["interface_closure"]
         for name in ("residual", "converged", "rms_slope"):

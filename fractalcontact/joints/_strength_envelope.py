@@ -12,12 +12,10 @@ import xarray as xr
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.base.validation import Problems, require, word_tuple
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._roughness import directional_roughness
 from fractalcontact.joints._roughness import roughness_coefficient as measured_coefficient
-
-WHERE = "fractalcontact.joints.strength_envelope"
 
 MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
 NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
@@ -161,10 +159,9 @@ def strength_envelope(
     chosen = _usable(given) if criterion is None else word_tuple(criterion)
     measured = _measured(surface, direction)
     joint = _criteria.Joint.of(given, measured)
-    with Problems(WHERE) as problems:
-        total = joint.asperity_angle + joint.basic_friction_angle
-        expected = "less than 90 degrees with the basic friction angle"
-        problems.require(not total >= 90.0, "asperity_angle", expected, f"{total:g}")
+    total = joint.asperity_angle + joint.basic_friction_angle
+    expected = "less than 90 degrees with the basic friction angle"
+    require(not total >= 90.0, "asperity_angle", expected, f"{total:g}")
     strengths, ranges = zip(
         *(_criteria.STRENGTH[name].strength(pressure, joint) for name in chosen), strict=True
     )

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -139,15 +139,19 @@ def transmissivity(
         for opening in values.reshape(-1, *values.shape[-2:])
         for flow in gap_flows(opening, ratio, wraps, order, [AXES.index(name) for name in axes])
     ]
-    shape = (*values.shape[:-2], len(axes))
-    conductivity = np.reshape([flow.conductivity for flow in flows], shape)
-    dims = (*leading, "axis")
+    dims, shape = (*leading, "axis"), (*values.shape[:-2], len(axes))
+
+    def of_flows(name: str) -> Array:
+        columns = [getattr(flow, name) for flow in flows]
+        return np.reshape(columns, (*shape, *np.shape(columns[0])))
+
+    conductivity = of_flows("conductivity")
     result = xr.Dataset(
         {
             "transmissivity": (dims, conductivity / 12.0),
             "hydraulic_aperture": (dims, np.cbrt(conductivity)),
-            "percolates": (dims, np.reshape([flow.percolates for flow in flows], shape)),
-            "residual": (dims, np.reshape([flow.residual for flow in flows], shape)),
+            "percolates": (dims, of_flows("percolates")),
+            "residual": (dims, of_flows("residual")),
             "aperture": (leading, np.maximum(values, 0.0).mean(axis=(-2, -1))),
             "open_fraction": (leading, (values > 0).mean(axis=(-2, -1))),
             "narrow_fraction": (leading, _flow_network.narrow_cells(values).mean(axis=(-2, -1))),
@@ -159,13 +163,8 @@ def transmissivity(
     if viscosity is not None:
         result["flow_conductance"] = result["transmissivity"] / viscosity
     _warn(result)
-    maps = {
-        "relative_pressure": [flow.pressure for flow in flows],
-        "flux_x": [flow.flux[1] for flow in flows],
-        "flux_y": [flow.flux[0] for flow in flows],
-    }
     for name in (name for word in kept for name in MAPS[word]):
-        result[name] = (*dims, "y", "x"), np.reshape(maps[name], (*shape, *values.shape[-2:]))
+        result[name] = (*dims, "y", "x"), of_flows(name)
     return result.assign_coords(y=gap["y"].variable, x=gap["x"].variable) if kept else result
 
 
@@ -180,18 +179,18 @@ def _warn(result: xr.Dataset) -> None:
     warn(message, ConvergenceWarning)
 
 
-@dataclass(frozen=True)
-class Flow:
+class Flow(NamedTuple):
     """Conductivity of the whole plane (gap cubed), whether an open path crosses it, error of the solution.
 
-    `pressure` falls by 1 along the plane, NaN where nothing flows; `flux` is along y and x, over 12.
+    `relative_pressure` falls by 1 along the plane, NaN where nothing flows; the fluxes are over 12.
     """
 
     conductivity: float
     percolates: bool
     residual: float
-    pressure: Array
-    flux: Array
+    relative_pressure: Array
+    flux_x: Array
+    flux_y: Array
 
 
 def gap_flows(
@@ -215,25 +214,15 @@ def gap_flows(
     unit = power_of_two(float(gap.max()))
     cells = (gap / unit) ** 3
     network = _flow_network.link_network(cells, ratio, wraps)
-    flows = [_flow_along(axis, network, cells, ratio, order, repeats=wraps[axis]) for axis in axes]
-    return [
-        replace(flow, conductivity=flow.conductivity * unit**3, flux=flow.flux * unit**3) for flow in flows
-    ]
-
-
-def _without_maps(
-    shape: tuple[int, ...], conductivity: float = 0.0, *, percolates: bool = False, residual: float = 0.0
-) -> Flow:
-    """Return that nothing flows, or that the flow is not known (NaN)."""
-    flux = np.full((2, *shape), conductivity)
-    return Flow(conductivity, percolates, residual, np.full(shape, np.nan), flux)
+    return [_flow_along(axis, network, cells, ratio, order, unit**3, repeats=wraps[axis]) for axis in axes]
 
 
 def _flow_along(
-    axis: int, network: Network, cells: Array, ratio: float, order: Array, *, repeats: bool
+    axis: int, network: Network, cells: Array, ratio: float, order: Array, unit: float, *, repeats: bool
 ) -> Flow:
-    """Return the flow along an axis; lengths are in units of the spacing of x."""
+    """Return the flow along an axis; cells are in this unit, and lengths in that of the spacing of x."""
     held, ends = _flow_network.nothing_held(cells.shape), []
+    nothing, unknown = np.zeros(cells.shape), np.full(cells.shape, np.nan)
     if repeats:
         network = replace(network, jump=(network.closes & (network.axis == axis)).astype(np.float64))
         inside = _flow_network.winding_cells(network)
@@ -243,19 +232,19 @@ def _flow_along(
             held.add(_flow_network.line_of(axis, place), end, level)
         inside = _flow_network.spanning_cells(network, axis, ends)
     if not inside.any():
-        return _without_maps(cells.shape)
+        return Flow(0.0, False, 0.0, unknown, nothing, nothing)
     pressure, error = pressures(network, inside, order, held, axis)
     flow = _flow_network.dissipation(network, pressure, inside, held)
     least = _flow_network.least_flow(network, axis, inside, ends)
     residual = max(least / flow - 1.0, error)
     if not residual <= ERROR:
-        return _without_maps(cells.shape, math.nan, percolates=True, residual=residual)
+        return Flow(math.nan, True, residual, unknown, unknown, unknown)
     spacing = (ratio, 1.0)
     length, width = (cells.shape[each] * spacing[each] for each in (axis, 1 - axis))
     flows = _flow_network.cell_flows(network, pressure, inside, axis, ends)
-    flux = flows * length / 12.0 / np.array(spacing[::-1])[:, None, None]
+    flux_y, flux_x = flows * length / 12.0 / np.array(spacing[::-1])[:, None, None] * unit
     pressure = np.where(inside.reshape(cells.shape), pressure, np.nan)
-    return Flow(flow * length / width, True, residual, pressure, flux)
+    return Flow(flow * length / width * unit, True, residual, pressure, flux_x, flux_y)
 
 
 APERTURE_BOUNDS: dict[str, dict[str, Any]] = {

@@ -20,7 +20,6 @@ from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._flow_network import Held, Network
 from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
 
-WHERE = "fractalcontact.joints.uplift"
 EDGES = {"W": (1, False), "E": (1, True), "S": (0, False), "N": (0, True)}  # axis, is at its far end
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
 LARGEST = 1e12  # Pa or m: far beyond water and dams; products do not overflow

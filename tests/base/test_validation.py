@@ -1,5 +1,7 @@
 """Validation: all problems of a call in one error, and conversions of valid values."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -173,3 +175,11 @@ def test_folder_in_place_of_a_file_is_named_one(tmp_path):
     assert problems.messages == [f"path: expected an existing file, got the folder {tmp_path.name!r}"]
     assert not problems.file("path", tmp_path / "none.nc")
     assert problems.messages[1] == "path: expected an existing file, got 'none.nc'"
+
+
+def test_problems_in_the_body_of_a_function_name_it():
+    face = fc.surfaces.from_array(np.zeros((20, 20)), 1e-4)
+    with pytest.raises(InvalidInput, match="overlapping faces") as caught:
+        fc.joints.register(face, face)
+    assert caught.value.where == "fractalcontact.joints.register"
+    assert pickle.loads(pickle.dumps(caught.value)).where == caught.value.where
