@@ -23,7 +23,7 @@ from fractalcontact.plotting._inputs import (
 )
 from fractalcontact.plotting._line_panel import Family, LinePanel
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
-from fractalcontact.plotting._units import Units, marked, require_units
+from fractalcontact.plotting._units import Units, all_shown_in
 
 MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
 PLANE = ("method", "setting")
@@ -83,11 +83,8 @@ def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:
         groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
     else:
         groups = {"": as_dataset(measured)}
-    if units is not None:
-        require_units(groups.values(), units)
-        groups = {prefix: marked(data, units) for prefix, data in groups.items()}
     benchmarks = {}
-    for prefix, data in groups.items():
+    for prefix, data in all_shown_in(groups, units).items():
         require_variables(data, MEASURED)
         names = np.asarray(words(data["benchmark"]))
         for name in dict.fromkeys(names.tolist()):

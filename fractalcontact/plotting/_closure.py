@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, require
 from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._fields import MAPS
 from fractalcontact.plotting._figure import StudyFigure, figure
@@ -75,9 +75,8 @@ def _draw_laws(result: Any, laws: Any, key: bool, log: bool, units: Units | None
     names = ("interface_closure", "nominal_pressure")
     data = result_of(result, names, _paths.PATH, units)
     fitted = result_of(laws, (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
-    with Problems("fc.plotting") as problems:
-        count, of_laws = data.sizes["shear"], fitted.sizes["shear"]
-        problems.require(of_laws == count, "laws", f"{count} shears, as of the closure", of_laws)
+    count, of_laws = data.sizes["shear"], fitted.sizes["shear"]
+    require(of_laws == count, "laws", f"{count} shears, as of the closure", of_laws)
     panel = LinePanel.of(ax, data, *names, _paths.PATH, _paths.by_shear(data))
     points, pressure = panel.x.values, panel.y.values
     if "seated_closure" in fitted:
@@ -160,11 +159,10 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
                                               and d not in ("diagram", "x", "y")])  # fmt: skip
     names = ("uplift_profile", "uplift_x", "uplift_y", "diagram")
     require_dims(data, dict.fromkeys(names, "diagram"))
-    with Problems("fc.plotting") as problems:
-        problems.require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
-        diagrams = words(data["diagram"])
-        are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
-        problems.require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)
+    require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
+    diagrams = words(data["diagram"])
+    are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
+    require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), width_ratios=(1.0, 1.1))
     _maps.draw_values(left, plane)
     left.set_title(_state(data))

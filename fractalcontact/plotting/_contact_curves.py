@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.units import Scale
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import require
 from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
@@ -123,8 +123,7 @@ def path(
     given = () if against is None else (against,)
     data = result_of(result, (*names, *given), PATH, units)
     found = dict.fromkeys(data[name].attrs.get("units", "1") for name in names)
-    with Problems("fc.plotting.path") as problems:
-        problems.require(len(found) == 1, "variable", "variables of one unit", ", ".join(found))
+    require(len(found) == 1, "variable", "variables of one unit", ", ".join(found))
     dims, x, family = _paths.path_axis(data, against)
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
@@ -148,9 +147,8 @@ def _own_variables(result: Any) -> list[str]:
     """Return the name of a DataArray, or the variables that a result states for its figure."""
     is_one = isinstance(result, xr.DataArray) and result.name is not None
     names = [str(result.name)] if is_one else str(result.attrs.get("path_figure", "")).split()
-    with Problems("fc.plotting") as problems:
-        known = ", ".join(map(str, getattr(result, "data_vars", ())))
-        problems.require(bool(names), "variable", f"one of {known}: the result has no standard figure", NONE)
+    known = ", ".join(map(str, getattr(result, "data_vars", ())))
+    require(bool(names), "variable", f"one of {known}: the result has no standard figure")
     return names
 
 
@@ -162,9 +160,7 @@ def pressure_distribution(
     names = ("area_share", "maximum_pressure", "pressure_class", "nominal_pressure")
     data = result_of(result, names, ("step",), units)
     require_dims(data, {"area_share": "pressure_class"})
-    with Problems("fc.plotting") as problems:
-        count = data.sizes["pressure_class"]
-        problems.require(count > 0, "result.pressure_class", "at least one entry", NONE)
+    require(data.sizes["pressure_class"] > 0, "result.pressure_class", "at least one entry")
     data = data.isel(step=spread_indices(data.sizes["step"], _style.MOST_CURVES))
     share = table(data, "area_share", ("step", "pressure_class"))
     greatest, nominal = (table(data, name, ("step",)) for name in names[1::2])

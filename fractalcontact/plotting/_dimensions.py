@@ -10,13 +10,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import is_within
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import as_dataset, quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
-from fractalcontact.plotting._units import PLAIN, Quantity, Units, marked, require_units, scale_of
+from fractalcontact.plotting._units import PLAIN, Quantity, Units, all_shown_in, scale_of
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "divider", "box_length", "box_size")
 # log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
@@ -79,12 +79,9 @@ def _curves_in(
         is_one = not isinstance(curves, Mapping) or isinstance(curves, xr.Dataset | xr.DataTree)
         by_name = {"": curves} if is_one else curves
     datasets = {str(name): as_dataset(curve) for name, curve in by_name.items()}
-    if units is not None:
-        require_units(datasets.values(), units)
-        datasets = {name: marked(curve, units) for name, curve in datasets.items()}
+    datasets = all_shown_in(datasets, units)
     datasets = {name or curve_of(curve)[1]: curve for name, curve in datasets.items() if curve_of(curve)[1]}
-    with Problems("fc.plotting") as problems:
-        problems.require(bool(datasets), "result", f"a variable out of {', '.join(CURVES)}", NONE)
+    require(bool(datasets), "result", f"a variable out of {', '.join(CURVES)}")
     if estimates is not None:
         estimates = result_of(estimates, ESTIMATES, ("method",), argument="estimates")
     return datasets, estimates
@@ -110,8 +107,7 @@ def _fit_of(estimates: xr.Dataset | None, name: str) -> xr.Dataset | None:
 def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.Dataset | None) -> None:
     scale, value = curve_of(curve)
     curve = result_of(curve, (scale, value), ())
-    with Problems("fc.plotting") as problems:
-        problems.require(curve[scale].ndim == 1, "result", f"{scale} along one dim", curve[scale].dims)
+    require(curve[scale].ndim == 1, "result", f"{scale} along one dim", curve[scale].dims)
     dims = curve[scale].dims
     x, y = quantity(curve, scale, dims), quantity(curve, value, dims)
     y = replace(y, width=28)  # the upper panel has two thirds of the height
@@ -335,8 +331,7 @@ def directional_roughness(result: Any, *, units: Units | None = None, ax: Axes |
     data = result_of(result, tuple(DIRECTIONAL), ("azimuth",), units)
     require_dims(data, dict.fromkeys(DIRECTIONAL, "azimuth"))
     polar: Any = _style.axes_or_new(ax, (_style.PANEL[0], _style.MAP[1]), projection="polar")
-    with Problems("fc.plotting") as problems:
-        problems.require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)
+    require(polar.name == "polar", "ax", "polar axes (projection='polar')", polar.name)
     azimuth = data["azimuth"].values
     order = np.argsort(azimuth % 360.0)
     if _is_full_circle(azimuth):

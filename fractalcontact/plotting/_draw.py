@@ -18,7 +18,7 @@ from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import group_of, member_count
-from fractalcontact.base.validation import NONE, Problems, Words, writing
+from fractalcontact.base.validation import Problems, Words, require, writing
 from fractalcontact.plotting import (
     _accuracy,
     _closure,
@@ -176,9 +176,11 @@ def _standard_kind(result: Any) -> str:
     for kind, (_, variables) in kinds.items():
         if not names.isdisjoint(variables):
             return kind
-    with Problems("fc.plotting") as problems:
-        expected = "one result, scaling curves by name, or all of accuracy.measure; `draw` draws a study"
-        problems.require(is_one, "result", expected, NONE)
+    require(
+        is_one,
+        "result",
+        "one result, scaling curves by name, or all of accuracy.measure; `draw` draws a study",
+    )
     return "field" if isinstance(result, xr.DataArray) and {"y", "x"} <= set(result.dims) else "path"
 
 

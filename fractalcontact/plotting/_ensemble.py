@@ -12,7 +12,7 @@ import xarray as xr
 
 from fractalcontact.base.regression import is_far
 from fractalcontact.base.study import MEMBER
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import result_of
@@ -150,8 +150,7 @@ def scans(result: Any, *, units: Units | None = None, axes: Panels | None = None
     names = [name for name in names if not name.endswith(NOT_SHOWN) and np.isfinite(data[name]).any()]
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
     names = [name for name in names if data[name].max() > data[name].min()] or names
-    with Problems("fc.plotting") as problems:
-        problems.require(SCAN in result.dims and bool(names), "result", "numbers over scan", NONE)
+    require(SCAN in result.dims and bool(names), "result", "numbers over scan")
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
     for ax, name in zip(shown, names, strict=False):
         _draw_distribution(ax, data, name)

@@ -45,18 +45,19 @@ def contact_domains(
     rows = -(-count // columns)
     has_legend = name == "slip_state" or bool((state > 1).any())
     left, right, bottom, top = extent_of(state)
-    shape = min(max((top - bottom) / (right - left), 0.1), 5.0)  # narrower maps would have no room for words
-    height = 0.5 + rows * (shape * (width / columns - 0.15) + 0.28) + 0.25 * has_legend
+    ratio = min(max((top - bottom) / (right - left), 0.1), 5.0)  # narrower maps would have no room for words
+    height = 0.5 + rows * (ratio * (width / columns - 0.15) + 0.28) + 0.25 * has_legend
     size = (max(width, 3.0), height)
-    zooms: Any
-    if window is None:
-        shown, zooms = _style.panels(axes, (rows, columns), size, count=count), []
-    else:
-        size = (size[0] * (columns + 1) / columns, height)
-        grid = _style.panels(axes, (rows, columns + 1), size)
-        zooms, shown = grid[:, -1], grid[:, :-1].ravel()[:count]
-        for unused in grid[:, :-1].ravel()[count:]:
-            unused.remove()
+    shape = (rows, columns)
+    if window is not None:
+        size, shape = (size[0] * (columns + 1) / columns, height), (rows, columns + 1)
+    elif _style.are_given(axes):
+        shape = (1, count)
+    grid = _style.panels(axes, shape, size)
+    maps, zooms = (part.ravel() for part in np.split(grid, [shape[1] - (window is not None)], axis=1))
+    for unused in maps[count:]:
+        unused.remove()
+    shown = maps[:count]
     sheet = _style.sheet_of(axes, shown)
     head = [path.common] if sheet is None else []  # no room above the panels of others
     fontsize = "medium" if window is None else "small"  # beside a window the maps are narrower
@@ -74,7 +75,7 @@ def contact_domains(
         sheet.suptitle(path.common, x=0.01, ha="left", fontsize="medium")
     if has_legend:
         _maps.draw_flag_legend(shown, sheet, name)
-    return np.concatenate([shown, zooms]) if len(zooms) else shown
+    return np.concatenate([shown, zooms])
 
 
 def _share_text(plane: xr.DataArray) -> str:

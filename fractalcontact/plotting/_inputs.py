@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting._units import Quantity, Units, name_of, scale_of, shown_in
 
-Array = np.ndarray[Any, np.dtype[Any]]
 MAPS = ("height", "state", "slip_state", "label")
 PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import spread_indices
+from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
@@ -156,7 +156,6 @@ def evolution(
     return shown
 
 
-Array = np.ndarray[Any, np.dtype[Any]]
 LARGEST = 20  # islands of the last state with a colour of their own: more could not be told apart
 BEND = np.linspace(0.0, 1.0, 24)  # along a ribbon: smooth at the size of a printed figure
 COLUMNS = ("island_before", "island_after", "common_cells", "cells_before", "cells_after", "link_step")

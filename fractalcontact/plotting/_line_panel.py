@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import spread_indices
+from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import quantity, table
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Quantity
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Styles = Sequence[dict[str, Any]]
 LETTER_NAME = "letter of a marked point"
 BAND_OPACITY = 0.14  # of an interval under its curve: five on top of each other hide half of what is below

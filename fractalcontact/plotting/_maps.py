@@ -7,15 +7,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import ROUNDED
+from fractalcontact.base.numbers import ROUNDED, Array
 from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import as_dataset, extent_of
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Quantity, Units, label_axis, name_of, scale_of, shown_in
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 STATES = {
     "state": (("open", "contact", "yielded"), _style.STATE_COLOURS),

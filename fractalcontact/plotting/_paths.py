@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import ROUNDED, spread_indices
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import NONE, Problems, require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import Drawing
 from fractalcontact.plotting._inputs import as_dataset, nearest, quantity, table, words
@@ -31,9 +31,8 @@ def loads_of(data: xr.Dataset, against: str, dims: tuple[str, str] = PATH) -> Qu
         steps = np.arange(data.sizes["step"], dtype=float)
         values = np.broadcast_to(steps, [data.sizes[dim] for dim in PATH])
         return Quantity(values if dims == PATH else values.T, PLAIN, "step")
-    with Problems("fc.plotting") as problems:
-        own = data[against].dims
-        problems.require(set(own) <= set(PATH), "against", "a variable of every step", own)
+    own = data[against].dims
+    require(set(own) <= set(PATH), "against", "a variable of every step", own)
     return quantity(data, against, dims)
 
 

@@ -82,10 +82,10 @@ def signature(
         require_variables(data, [dim])
         slope = constant + sign * local_slope(data[dim].values, data[name].values)
         data = data.assign(null_local_slope=(data[name].dims, slope))
-    shown = path_panels(axes, data)
+    panels = path_panels(axes, data)
     null = NULLS[nulls[0]][0] if nulls else ""
     names = ("local_slope", "local dimension")
-    for panel, path in _size_curves(data, shear, normal_force, shown, names, null):
+    for panel, path in _size_curves(data, shear, normal_force, panels, names, null):
         _mark_sizes(panel, path.states, path.dim)
         panel.finish(log="x", empty="no contact")
         panel.ax.set_ylim(-0.05, 2.05)
@@ -97,7 +97,7 @@ def signature(
             place: dict[str, Any] = {"transform": panel.ax.transAxes, "ha": "right", "size": "small"}
             panel.ax.text(1.0, 1.01, note, color=_style.grey(), **place)
             panel.ax.set_title(path.common, pad=16)  # points: above the note
-    return as_array(shown)
+    return panels[1]
 
 
 def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
@@ -158,9 +158,9 @@ def lacunarity(
     """
     data = result_of(result, ("lacunarity",), PATH, units)
     require_dims(data, {"lacunarity": "box_size"})
-    shown = path_panels(axes, data)
+    dims, shown = path_panels(axes, data)
     if maps:
-        for dim, ax in shown.items():
+        for dim, ax in zip(dims, shown, strict=True):
             path = _paths.states_along(data, dim, shear, normal_force)
             name = "shear" if dim == "shear" else _paths.load_of(path.states)
             own = path.states.expand_dims([d for d in PATH if d != dim])
@@ -169,37 +169,33 @@ def lacunarity(
             colours = quantity(path.states, "lacunarity", (dim, "box_size"))
             _maps.draw_heat_map(ax, places, sizes_of(path.states, "box_size"), colours)
             ax.set_title(path.common)
-        return as_array(shown)
-    for panel, _ in _size_curves(data, shear, normal_force, shown, ("lacunarity", ""), CELLS_NULL):
+        return shown
+    panels, names = (dims, shown), ("lacunarity", "")
+    for panel, _ in _size_curves(data, shear, normal_force, panels, names, CELLS_NULL):
         finite = panel.y.values[np.isfinite(panel.y.values)]
         steep = finite.size > 0 and finite.max() > 1.5 * finite.min()  # else a linear axis has more labels
         panel.finish(log="xy" if steep else "x", empty="no contact")
-    return as_array(shown)
+    return shown
 
 
-def path_panels(axes: Panels | None, data: xr.Dataset) -> dict[str, Axes]:
-    """Return Axes for each path dim that is longer than one (`step` if none is)."""
+def path_panels(axes: Panels | None, data: xr.Dataset) -> tuple[list[str], AxesArray]:
+    """Return the path dims that are longer than one (`step` if none is), and Axes for each of them."""
     dims = [dim for dim in ("step", "shear") if data.sizes[dim] > 1] or ["step"]
     size = (_style.WIDTH + 0.6, 3.1) if len(dims) > 1 else _style.PANEL
-    return dict(zip(dims, _style.panel_row(axes, len(dims), size), strict=True))
-
-
-def as_array(panels: dict[str, Axes]) -> AxesArray:
-    """Return the Axes of the panels as an array."""
-    return np.array(list(panels.values()), dtype=object)
+    return dims, _style.panel_row(axes, len(dims), size)
 
 
 def _size_curves(
     data: xr.Dataset,
     shear: float | None,
     force: float | None,
-    shown: dict[str, Axes],
+    panels: tuple[list[str], AxesArray],
     names: tuple[str, str],
     null: str,
 ) -> Iterator[tuple[LinePanel, StatePath]]:
     """Draw a variable over box size, beside its random null, and yield the panels to be finished."""
-    name, title = names
-    for dim, ax in shown.items():
+    (dims, shown), (name, title) = panels, names
+    for dim, ax in zip(dims, shown, strict=True):
         path = _paths.states_along(data, dim, shear, force, _style.MOST_CURVES)
         states = path.states
         over = next(str(last) for last in states[name].dims[::-1] if last not in PATH)
@@ -207,7 +203,7 @@ def _size_curves(
         panel = LinePanel.of(ax, states, sizes, name, (dim, over), path.family, y_name=title)
         panel.curves("contact domain")
         if f"null_{name}" in states:
-            key = null if ax is list(shown.values())[-1] else ""
+            key = null if ax is shown[-1] else ""
             panel.curves("random null", f"null_{name}", key=key, marker="", **_style.DASHED)
         ax.set_title(path.common)
         yield panel, path
@@ -256,11 +252,10 @@ def box_dimension(
     dataset = as_dataset(result)
     present = [name for name in DIMENSIONS if name in dataset]
     data = result_of(dataset, (present or DIMENSIONS)[:1], PATH, units)
-    shown, shears = path_panels(axes, data), _paths.by_shear(data)
-    first, *_, last = (*shown.values(), *shown.values())
+    (dims, shown), shears = path_panels(axes, data), _paths.by_shear(data)
     # the boundary has none also where there is contact, without an interior
     empty = "no dimension" if present[0] == "boundary_dimension" else "no contact"
-    for dim, ax in shown.items():
+    for dim, ax in zip(dims, shown, strict=True):
         if dim == "step":
             panel = _draw_dimension(ax, data, present[0], PATH, shears)
         else:
@@ -269,13 +264,13 @@ def box_dimension(
             family = Family([{"color": _style.ink()}], [load] if load else [])
             panel = _draw_dimension(ax, path.expand_dims("step"), present[0], PATH[::-1], family)
             ax.set_title(load)
-        if ax is not first:
+        if ax is not shown[0]:
             ax.set_ylabel("")
         panel.family = shears if data.sizes["step"] > 1 else Family([])
         log = "x" if _style.needs_log_axis(panel.x.values) else ""
-        panel.finish(log=log, legend=ax is last, empty=empty)
+        panel.finish(log=log, legend=ax is shown[-1], empty=empty)
         ax.set_ylim(-0.05, 2.05)
-    return as_array(shown)
+    return shown
 
 
 def _draw_dimension(

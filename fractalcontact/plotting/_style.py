@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import require
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -87,31 +87,21 @@ def are_given(axes: Panels | None) -> bool:
 
 
 def panels(
-    axes: Panels | None,
-    shape: tuple[int, int],
-    size: tuple[float, float],
-    *,
-    count: int | None = None,
-    **layout: Any,
+    axes: Panels | None, shape: tuple[int, int], size: tuple[float, float], **layout: Any
 ) -> AxesArray:
-    """Return an array of the Axes to draw on, of shape (rows, columns), or the first `count` of them.
+    """Return an array of the Axes to draw on, of shape (rows, columns).
 
     Those given are taken as they come. Otherwise they are made in the figure `axes`, or in a new one.
     """
     if are_given(axes):
-        given = np.ravel(np.asarray(axes, dtype=object))
-        needed = shape[0] * shape[1] if count is None else count
-        with Problems("fc.plotting") as problems:
-            problems.require(given.size == needed, "axes", f"{needed} Axes", f"{given.size}")
-        return given.reshape(shape) if count is None else given
+        given, needed = np.ravel(np.asarray(axes, dtype=object)), shape[0] * shape[1]
+        require(given.size == needed, "axes", f"{needed} Axes", f"{given.size}")
+        return given.reshape(shape)
     sheet: Any = new_figure(size) if axes is None else axes
     made = np.asarray(sheet.subplots(*shape, squeeze=False, **layout))
-    for unused in () if count is None else made.ravel()[count:]:
-        unused.remove()
-    shown = made if count is None else made.ravel()[:count]
-    for ax in shown.ravel():
+    for ax in made.ravel():
         style_axes(ax)
-    return shown
+    return made
 
 
 def number_of_columns(count: int) -> int:

@@ -10,11 +10,11 @@ from typing import Any, TypeAlias
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.units import Scale, named_scale, number, scale_for
 from fractalcontact.base.validation import Problems
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Units: TypeAlias = Mapping[str, str]  # by the name of a variable
 WANTED = "display_units"  # attribute of a variable whose unit in a figure was chosen
 
@@ -75,10 +75,15 @@ UNITS_EXPECTED = ("a dict of variable and unit", _are_units)
 
 def shown_in(data: xr.Dataset, units: Units | None) -> xr.Dataset:
     """Return a result whose variables have the units that a figure is to show them in as an attribute."""
+    return all_shown_in({"": data}, units)[""]
+
+
+def all_shown_in(datasets: dict[str, xr.Dataset], units: Units | None) -> dict[str, xr.Dataset]:
+    """Return the results of one figure, each as `shown_in` does."""
     if units is None:
-        return data
-    require_units([data], units)
-    return marked(data, units)
+        return datasets
+    require_units(datasets.values(), units)
+    return {name: marked(data, units) for name, data in datasets.items()}
 
 
 def require_units(datasets: Iterable[xr.Dataset], units: Units) -> None:
