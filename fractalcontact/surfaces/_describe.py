@@ -15,7 +15,7 @@ from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.regression import RANK, scaled_slopes, shifted
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, require
 from fractalcontact.surfaces._from_array import check_stack, labelled_rows
 
 NAYAK = "Nayak, Random process model of rough surfaces, Journal of Lubrication Technology 93 (1971) 398-407"
@@ -173,9 +173,7 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
         low, high = min(low, float(known.min(initial=low))), max(high, float(known.max(initial=high)))
         origin = float(known[0]) if known.size and math.isnan(origin) else origin  # for digits of the mean
         total, size = total + float((known - origin).sum()), size + known.size
-    with Problems("fractalcontact.surfaces.describe") as problems:
-        expected = "finite heights, or NaN where missing"
-        problems.require(infinite == 0, "surface", expected, f"{infinite} infinite")
+    require(infinite == 0, "surface", "finite heights, or NaN where missing", f"{infinite} infinite")
     if not size:
         return {"missing_points": surface.size}
     scale = power_of_two(high - low)

@@ -19,8 +19,8 @@ import xarray as xr
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import require_unpacked, unpacked_limit
+from fractalcontact.base.validation import NONE, Problems
 
-WHERE = "fractalcontact.surfaces.read"
 RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20
 
 COMMENTS = ("//", "%")
@@ -46,13 +46,13 @@ def open_bytes(path: Path) -> IO[bytes]:
     with corrupt_named(path.name), gzip.open(path) as file:
         while content.tell() <= limit and (block := file.read(1 << 22)):
             content.write(block)
-    require_unpacked(WHERE, path.name, content.tell(), limit)
+    require_unpacked("", path.name, content.tell(), limit)
     content.seek(0)
     return content
 
 
 @contextmanager
-def corrupt_named(name: str, where: str = WHERE) -> Iterator[None]:
+def corrupt_named(name: str) -> Iterator[None]:
     """Raise `UnreadableFile` for whatever a library raises in the block, but for errors of the system."""
     try:
         yield
@@ -61,7 +61,13 @@ def corrupt_named(name: str, where: str = WHERE) -> Iterator[None]:
         if of_system or isinstance(error, (FractalContactError, MemoryError)):
             raise
         reason = str(error)[:300] or type(error).__name__
-        raise UnreadableFile(where, [f"path: {name!r} is corrupt ({reason})"]) from error
+        raise UnreadableFile("", [f"path: {name!r} is corrupt ({reason})"]) from error
+
+
+def require_readable(condition: bool, argument: str, expected: str, got: object = NONE) -> None:
+    """Raise `UnreadableFile` unless a condition of a file holds."""
+    with Problems("", UnreadableFile) as problems:
+        problems.require(condition, argument, expected, got)
 
 
 def check_unpacked(name: str, file: IO[bytes]) -> None:
@@ -80,7 +86,7 @@ def check_unpacked(name: str, file: IO[bytes]) -> None:
 
             unpacked = sum(8 * math.prod(shape) for _, shape, _ in whosmat(file))
     file.seek(0)
-    require_unpacked(WHERE, name, unpacked, limit)
+    require_unpacked("", name, unpacked, limit)
 
 
 def _hdf5_size(file: IO[bytes]) -> int:

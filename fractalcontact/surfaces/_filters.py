@@ -8,12 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.numbers import Array, is_within
 from fractalcontact.base.regression import detrended
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, require
 from fractalcontact.surfaces._from_array import check_stack, height_stack, with_heights
 
 POLYNOMIALS = ("mean", "plane", "quadric")
@@ -64,11 +63,9 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
     stack = height_stack(surface)
     fits = [detrended(each, int(order)) if np.isfinite(each).any() else (each, False) for each in stack]
     failed = sum(not determined for _, determined in fits)
-    if failed:
-        where = "" if len(fits) == 1 else f" ({failed} of {len(fits)} planes)"
-        expected = f"observed points that fix a {POLYNOMIALS[order]}"
-        message = f"surface: expected {expected}, got too few of them{where}"
-        raise InvalidInput("fractalcontact.surfaces.level", [message])
+    where = "" if len(fits) == 1 else f" ({failed} of {len(fits)} planes)"
+    expected = f"observed points that fix a {POLYNOMIALS[order]}"
+    require(not failed, "surface", expected, f"too few of them{where}")
     levelled = with_heights(surface, np.stack([residual for residual, _ in fits]))
     if order > 0:
         for dim in {"y", "x"} & set(levelled.coords):

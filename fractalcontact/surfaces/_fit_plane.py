@@ -179,7 +179,7 @@ def _require_plane(sizes: Array) -> None:
             "select one face of it first"
         )
     if problem:
-        raise InvalidInput("fractalcontact.surfaces.fit_plane", [f"points: expected {problem}"])
+        raise InvalidInput("", [f"points: expected {problem}"])
 
 
 def _rotation_to(normal: Array, axis: int) -> Array:

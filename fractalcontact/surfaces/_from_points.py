@@ -15,11 +15,9 @@ from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import Array, as_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.units import UNITS
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, Words, require
 from fractalcontact.surfaces import _fit_plane
 from fractalcontact.surfaces._from_array import check_length
-
-WHERE = "fractalcontact.surfaces.from_points"
 
 
 def _check(problems: Problems) -> None:
@@ -277,8 +275,7 @@ def _profile(
     """Return heights of a profile whose points are not uniform, interpolated linearly."""
     x, inverse, repeats = np.unique(points[:, 0], return_inverse=True, return_counts=True)
     z = np.bincount(inverse, weights=points[:, 1]) / repeats
-    if x.size < 3:
-        raise InvalidInput(WHERE, ["points: expected at least 3 positions along the profile"])
+    require(x.size >= 3, "points", "at least 3 positions along the profile", x.size)
     distances = np.diff(x)
     longest, bridged = _bridged(distances, distances, largest_gap)
     near = distances[bridged]
@@ -317,8 +314,7 @@ def _triangulated(
     longest = np.sqrt((sides**2).sum(axis=-1).max(axis=1))
     doubled = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
     areas = np.abs(doubled)
-    if not areas.sum() > 0:
-        raise InvalidInput(WHERE, ["points: expected points that span an area in the plane"])
+    require(bool(areas.sum() > 0), "points", "points that span an area in the plane")
     if given is not None and largest_gap is None:
         largest_gap = math.inf
     gap, kept = _bridged(longest, areas, largest_gap)
@@ -350,7 +346,7 @@ def _delaunay(flat: Array) -> Array:
         triangulation = Delaunay(flat / float(np.abs(flat).max()))
     except (QhullError, ValueError) as error:
         message = "points: expected points that span an area in the plane, got points on one line"
-        raise InvalidInput(WHERE, [message]) from error
+        raise InvalidInput("", [message]) from error
     return np.asarray(triangulation.simplices, dtype=np.int64)
 
 
@@ -367,9 +363,8 @@ def _bridged(
         share = np.cumsum(weights[order])
         largest_gap = factor * lengths[order][np.searchsorted(share, 0.5 * share[-1])]
     bridged = (lengths <= largest_gap) & (weights > 0)
-    if not bridged.any():
-        expected = f"more than the smallest distance of points, {lengths.min():.3g} m"
-        raise InvalidInput(WHERE, [f"largest_gap: expected {expected}, got {largest_gap:g}"])
+    expected = f"more than the smallest distance of points, {lengths.min():.3g} m"
+    require(bool(bridged.any()), "largest_gap", expected, Words(f"{largest_gap:g}"))
     return float(largest_gap), bridged
 
 
@@ -387,9 +382,8 @@ def _step(spacing: float | None, mean_distance: float, distance: float) -> float
     if spacing is None:
         return float(f"{mean_distance:.1e}")
     least = 0.1 * distance  # finer cells are interpolated, 99 of 100
-    if spacing < least:
-        expected = f"at least {least:.2g} m, a tenth of the distance of the points"
-        raise InvalidInput(WHERE, [f"spacing: expected {expected}, got {float(spacing):g}"])
+    expected = f"at least {least:.2g} m, a tenth of the distance of the points"
+    require(spacing >= least, "spacing", expected, Words(f"{float(spacing):g}"))
     return float(spacing)
 
 
@@ -406,8 +400,7 @@ def _centres(low: Array, high: Array, step: float, cells: tuple[_Axis, ...] | No
         problem = f"a spacing of at most {1 << 28} cells"
     elif not step >= 10.0**-DECADES:
         problem = f"at least 1e-{DECADES} m"
-    if problem:
-        raise InvalidInput(WHERE, [f"spacing: expected {problem}, got {step:g}"])
+    require(not problem, "spacing", problem, Words(f"{step:g}"))
     return tuple((start + 0.5 + np.arange(int(n))) * step for start, n in zip(first, counts, strict=True))
 
 

@@ -20,7 +20,6 @@ from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import FileContent, Request
 from fractalcontact.surfaces._from_array import surface_array
 
-WHERE = "fractalcontact.surfaces.read"
 PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"
 ARRAYS = ("h5", "mat", "npz")  # arrays of (row, column), in metres as those of an npy file
 PLAIN = ("asc", "h5", "hgt", "mat", "nc", "npy", "npz", "xyz")  # formats not specific to microscopes
@@ -56,8 +55,7 @@ def read_instrument(request: Request) -> FileContent:
         size, given = chosen.physical_sizes, units or ("m" if name in ARRAYS else None)
         lateral, vertical = chosen.unit if isinstance(chosen.unit, tuple) else (chosen.unit, chosen.unit)
         unit, lateral = given or other_unit or vertical, lateral or given
-        with Problems(WHERE, UnreadableFile) as problems:
-            _check(problems, chosen, size, unit, lateral, spacing)
+        _require_stated(chosen, size, unit, lateral, spacing)
         heights, periodic = _heights(reader, chosen, size, path.name)
     steps = _steps(heights.shape, size, lateral, spacing)
     row = request.first_row or ("bottom" if name in FROM_BOTTOM else "top")
@@ -112,7 +110,7 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
                 lines = str(error).splitlines() or [type(error).__name__]
                 reasons.append(f"{reader.__name__.removesuffix('Reader')} reader: {lines[0].strip()}")
     reason = "; ".join(reasons)[:300] or f"{tried} readers tried"
-    raise UnreadableFile(WHERE, [f"path: {path.name!r} is {UNKNOWN} ({reason})"])
+    raise UnreadableFile("", [f"path: {path.name!r} is {UNKNOWN} ({reason})"])
 
 
 def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
@@ -127,7 +125,7 @@ def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
     if is_real(channel) and isinstance(channel, (int, np.integer)) and 0 <= channel < len(channels):
         return channels[channel]
     allowed = ", ".join(f"{number} = {label!r}" for number, label in enumerate(names))
-    raise UnreadableFile(WHERE, [f"channel: expected one of {allowed}, got {channel!r}"])
+    raise UnreadableFile("", [f"channel: expected one of {allowed}, got {channel!r}"])
 
 
 def _other_unit(head: bytes) -> str | None:
@@ -140,24 +138,20 @@ def _other_unit(head: bytes) -> str | None:
     return unit if unit not in UNITS else None
 
 
-def _check(
-    problems: Problems,
-    chosen: Any,
-    size: Any,
-    unit: str | None,
-    lateral: str | None,
-    spacing: Sequence[float] | None,
+def _require_stated(
+    chosen: Any, size: Any, unit: str | None, lateral: str | None, spacing: Sequence[float] | None
 ) -> None:
-    """Note what neither the file nor the caller states."""
+    """Raise `UnreadableFile` for what neither the file nor the caller states."""
     name = f"channel {chosen.name!r}"
-    problems.require(bool(chosen.is_uniform), name, "points on a uniform grid", "scattered points")
-    if unit not in UNITS:
-        stated = NONE if unit is None else unit
-        problems.add(f"{name}, unit", 'a unit of length; give `units` ("m", "um" ...)', stated)
-    if spacing is None and size is None:
-        problems.add(f"{name}, size", "a lateral size; give `spacing` in metres", NONE)
-    elif spacing is None and lateral not in UNITS:
-        problems.add(f"{name}, lateral unit", "a unit of length; give `spacing` in metres", lateral)
+    with Problems("", UnreadableFile) as problems:
+        problems.require(bool(chosen.is_uniform), name, "points on a uniform grid", "scattered points")
+        if unit not in UNITS:
+            stated = NONE if unit is None else unit
+            problems.add(f"{name}, unit", 'a unit of length; give `units` ("m", "um" ...)', stated)
+        if spacing is None and size is None:
+            problems.add(f"{name}, size", "a lateral size; give `spacing` in metres", NONE)
+        elif spacing is None and lateral not in UNITS:
+            problems.add(f"{name}, lateral unit", "a unit of length; give `spacing` in metres", lateral)
 
 
 def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, bool]:
@@ -168,15 +162,14 @@ def _heights(reader: Any, chosen: Any, size: Any, name: str) -> tuple[Array, boo
     with _files.corrupt_named(name):
         topography = reader.topography(**options)
         values = topography.heights()
-    if np.iscomplexobj(values) or values.ndim not in (1, 2):
-        raise UnreadableFile(
-            WHERE, [f"channel {chosen.name!r}: expected real heights, got shape {values.shape}"]
-        )
+    is_plane = not np.iscomplexobj(values) and values.ndim in (1, 2)
+    got = f"shape {values.shape}"
+    _files.require_readable(is_plane, f"channel {chosen.name!r}", "real heights", got)
     if reader.format() not in ARRAYS:  # the library has x first
         heights = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
         return np.ascontiguousarray(_observed(heights).T), bool(topography.is_periodic)
     heights = np.ma.getdata(values).astype(np.float64)  # without the mask of the library for infinite ones
-    with Problems(WHERE, UnreadableFile) as problems:
+    with Problems("", UnreadableFile) as problems:
         problems.not_infinite("path", heights)
     return np.ascontiguousarray(heights), bool(topography.is_periodic)
 
@@ -240,7 +233,7 @@ def read_raster(request: Request) -> FileContent:
 def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:
     """Check for one band of real heights in projected coordinates, with rows along x."""
     transform = raster.transform
-    with Problems(WHERE, UnreadableFile) as problems:
+    with Problems("", UnreadableFile) as problems:
         problems.require(
             1 <= band <= raster.count, "channel", f"a band from 0 to {raster.count - 1}", channel
         )

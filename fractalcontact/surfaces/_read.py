@@ -22,9 +22,9 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import QUANTITIES
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import UNITS, in_metres
-from fractalcontact.base.validation import NONE, Problems, reading
+from fractalcontact.base.validation import NONE, Problems, Words, reading
 from fractalcontact.surfaces import _files, _read_points
-from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request
+from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request, require_readable
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import axis_spacing, check_heights, check_spacing, labelled_heights
 from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_instrument, read_raster
@@ -150,7 +150,7 @@ def read(
     (3, 1.5e-06, 1)
     """
     source = Path(path)
-    with reading(WHERE, source):
+    with reading("", source):
         content = file_content(Request(source, channel, units, spacing, first_row, columns, plane))
         digest = file_checksum(source)
     stated = content.entries["stated_unit"]
@@ -185,13 +185,11 @@ def file_content(request: Request) -> FileContent:
         return _archive_content(request)
     with _files.open_bytes(path) as file:
         head = file.read(8)  # the longest of the signatures
-    if not head:
-        raise UnreadableFile(WHERE, [f"path: expected data, got the empty file {path.name!r}"])
+    require_readable(bool(head), "path", "data", Words(f"the empty file {path.name!r}"))
     if head.startswith(RASTERS):
         return read_raster(request)
-    if head.startswith(IMAGES):
-        expected = "heights; fractalcontact.domains.read_mask reads the mask of an image"
-        raise UnreadableFile(WHERE, [f"path: expected {expected}, got {path.name!r}"])
+    expected = "heights; fractalcontact.domains.read_mask reads the mask of an image"
+    require_readable(not head.startswith(IMAGES), "path", expected, path.name)
     return _text_content(request) if suffix in TABLES else read_instrument(request)
 
 
@@ -210,24 +208,21 @@ def _text_content(request: Request) -> FileContent:
                 if content.entries["stated_size"] is not None:  # any text has numbers to some reader
                     return content
         fault = f"is not a table of numbers ({error})"
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} {fault}"]) from error
+        raise UnreadableFile("", [f"path: {path.name!r} {fault}"]) from error
     if _read_points.is_list(table, path, request.columns):
         return _gridded_points(_read_points.listed_points(table, path, request.columns), request)
     rows, number = table.values.shape
-    with Problems(WHERE, UnreadableFile) as problems:
-        if table.is_named:
-            expected = "line 1, column 1: expected a number"
-            first = table.names[0] if table.names else "words"
-            message = f"path: {path.name!r} is not a table of numbers ({expected}, got {first!r})"
-            problems.messages.append(message)
-        expected = "a grid of heights, or `columns`, the names or numbers of those of x, y, z"
-        is_tall = number < 12 and rows > 20 * number  # as a list of points is, not a map
-        problems.require(not is_tall, "path", expected, f"{rows} rows of {number} columns")
+    if table.is_named:
+        first = table.names[0] if table.names else "words"
+        fault = f"is not a table of numbers (line 1, column 1: expected a number, got {first!r})"
+        raise UnreadableFile("", [f"path: {path.name!r} {fault}"])
+    expected = "a grid of heights, or `columns`, the names or numbers of those of x, y, z"
+    is_tall = number < 12 and rows > 20 * number  # as a list of points is, not a map
+    require_readable(not is_tall, "path", expected, f"{rows} rows of {number} columns")
     if request.spacing is None:
         return _instrument_or_table(request, is_table=True)
-    with Problems(WHERE, UnreadableFile) as problems:
-        expected = "a grid of heights, one row to a line"
-        problems.require(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
+    expected = "a grid of heights, one row to a line"
+    require_readable(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
     return _heights_content(table.values, request)
 
 
@@ -239,7 +234,7 @@ def _instrument_or_table(request: Request, *, is_table: bool = False) -> FileCon
         if isinstance(error, UnreadableFile) and not (is_table and UNKNOWN in str(error)):
             raise
         expected = f"the spacing in metres, for {request.path.name!r} as a table of heights"
-        raise UnreadableFile(WHERE, [f"spacing: expected {expected}, got None"]) from None
+        raise UnreadableFile("", [f"spacing: expected {expected}, got None"]) from None
 
 
 def _gridded_points(points: Points, request: Request) -> FileContent:
@@ -247,12 +242,9 @@ def _gridded_points(points: Points, request: Request) -> FileContent:
     from fractalcontact.surfaces._from_points import from_points  # loads numba
 
     units, spacing, unit = request.units, request.spacing, request.units or points.unit or "m"
-    with Problems(WHERE, UnreadableFile) as problems:
-        problems.require(
-            np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing
-        )
+    require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
-    with Problems(WHERE, UnreadableFile):  # its problems are those of the file
+    with Problems("", UnreadableFile):  # its problems are those of the file
         surface = from_points(
             points.position, step, triangles=points.triangles, units=unit, plane=request.plane
         )
@@ -285,17 +277,15 @@ def _archive_content(request: Request) -> FileContent:
     stated, shape = [axis.size for axis in axes], list(values.shape[-2:])
     if spacing is None and stated == shape:
         steps = [np.diff(in_metres(axis, request.units or "m")) for axis in axes]
-        with Problems(WHERE, UnreadableFile) as problems:
-            for dim, step in zip(("y", "x"), steps, strict=True):
-                is_even = bool(np.ptp(step) <= UNIFORM * abs(step[0])) and step[0] != 0
-                problems.require(is_even, dim, "evenly spaced coordinates", "uneven ones")
+        for dim, step in zip(("y", "x"), steps, strict=True):
+            is_even = bool(np.ptp(step) <= UNIFORM * abs(step[0])) and step[0] != 0
+            require_readable(is_even, dim, "evenly spaced coordinates", "uneven ones")
         values = values[..., :: int(np.sign(steps[0][0])), :: int(np.sign(steps[1][0]))]
         spacing = [float(abs(step).mean()) for step in steps]
         # heights, even if three columns look like points
         return _heights_content(values, replace(request, spacing=spacing))
-    with Problems(WHERE, UnreadableFile) as problems:
-        expected = f"dims (y, x), as of the arrays y and x {tuple(stated)}"
-        problems.require(spacing is not None or stated != shape[::-1], name, expected, tuple(shape))
+    expected = f"dims (y, x), as of the arrays y and x {tuple(stated)}"
+    require_readable(spacing is not None or stated != shape[::-1], name, expected, tuple(shape))
     return _array_content(values, request)
 
 
@@ -303,9 +293,8 @@ def _channel(names: Sequence[str], request: Request, kind: str) -> str:
     """Return the name of the only array, of that called `channel` or with its number, or `height`."""
     channel, default = request.channel, names[0] if len(names) == 1 else "height"
     name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
-    with Problems(WHERE, UnreadableFile) as problems:
-        expected = f"one of {', '.join(map(repr, names))}" if names else kind
-        problems.require(name in names, "channel", f"{expected} in {request.path.name!r}", name)
+    expected = f"one of {', '.join(map(repr, names))}" if names else kind
+    require_readable(name in names, "channel", f"{expected} in {request.path.name!r}", name)
     return str(name)
 
 
@@ -320,7 +309,7 @@ def _array_content(values: Array, request: Request) -> FileContent:
 def _heights_content(values: Array, request: Request) -> FileContent:
     """Return an array of heights without coordinates as a surface."""
     spacing = request.spacing
-    with Problems(WHERE, UnreadableFile) as problems:
+    with Problems("", UnreadableFile) as problems:
         expected = f"the spacing in metres, which {request.path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
         if values.dtype.kind == "f":
@@ -339,7 +328,7 @@ def _netcdf_content(request: Request) -> FileContent:
     array = candidates[name]
     stated = array.attrs.get("units")
     unit = request.units or stated
-    with Problems(WHERE, UnreadableFile) as problems:
+    with Problems("", UnreadableFile) as problems:
         expected = 'a unit of length, or give `units` ("m", "um" ...)'
         is_unit = isinstance(unit, str) and unit in (*UNITS, *METRES)
         problems.require(is_unit, f"{name}.units", expected, NONE if stated is None else stated)

@@ -25,8 +25,6 @@ from fractalcontact.surfaces import _files
 from fractalcontact.surfaces._files import NotATable, Table
 from fractalcontact.surfaces._instruments import PROJECT
 
-WHERE = "fractalcontact.surfaces.read_points"
-
 MESHES = (".ply", ".stl", ".obj", ".off")
 CLOUDS = (".las", ".laz")
 LISTS = (".xyz", ".pts", ".csv", ".txt", ".tsv", ".dat", ".asc")
@@ -135,7 +133,7 @@ def read_points(
     [0.002, 0.005]
     """
     source = Path(path)
-    with reading(WHERE, source):
+    with reading("", source):
         content, digest = point_content(source, columns), file_checksum(source)
     unit = units or content.unit or "m"
     axes = ["x", "y", "z"] if content.position.shape[1] == 3 else ["x", "z"]
@@ -156,7 +154,7 @@ def point_content(path: Path, columns: Sequence[str | int] | None) -> Points:
     try:
         table = _files.read_table(path)
     except NotATable as error:
-        raise UnreadableFile(WHERE, [f"path: {path.name!r} is not a table of numbers ({error})"]) from error
+        raise UnreadableFile("", [f"path: {path.name!r} is not a table of numbers ({error})"]) from error
     return listed_points(table, path, columns)
 
 
@@ -176,7 +174,7 @@ def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None)
     """Return the points of a table."""
     chosen = _columns(table, path, columns)
     stated = {table.units[k] for k in chosen if table.units and table.units[k]}
-    with Problems(WHERE, UnreadableFile) as problems:
+    with Problems("", UnreadableFile) as problems:
         names = [name for name in table.names if name.lower() in DEGREES]
         expected = f"coordinates in a unit of length; {PROJECT}"
         problems.require(
@@ -220,7 +218,7 @@ def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> l
         problem = (
             f"columns: expected the names or numbers of those of x, y, z; {path.name!r} has columns {known}"
         )
-    raise UnreadableFile(WHERE, [problem])
+    raise UnreadableFile("", [problem])
 
 
 def _place(names: list[str], group: Sequence[str]) -> int | None:
@@ -233,15 +231,14 @@ def _mesh(path: Path, suffix: str) -> Points:
     require_library(f"reading {path.name!r}", "trimesh", "mesh")
     import trimesh
 
-    with _files.corrupt_named(path.name, WHERE):
+    with _files.corrupt_named(path.name):
         with _files.open_bytes(path) as file:
             mesh = trimesh.load(file, file_type=suffix.lstrip("."), process=False)
         if isinstance(mesh, trimesh.Scene):
             mesh = mesh.to_mesh() if mesh.geometry else trimesh.Trimesh()
         position = np.array(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         triangles = np.array(getattr(mesh, "faces", np.empty((0, 3))), dtype=np.int64).reshape(-1, 3)
-    if len(position) == 0:
-        raise UnreadableFile(WHERE, [f"path: expected points in {path.name!r}, got none"])
+    _files.require_readable(len(position) > 0, "path", f"points in {path.name!r}")
     entries = {"format": suffix.lstrip("."), "reader": f"trimesh {trimesh.__version__}"}
     return Points(position, None, triangles if len(triangles) else None, entries)
 
@@ -253,12 +250,12 @@ def _las(path: Path) -> Points:
 
     if _files.file_suffix(path) == ".laz" and not laspy.LazBackend.detect_available():
         raise MissingExtra(f"reading {path.name!r}", "lazrs", "mesh")
-    with _files.corrupt_named(path.name, WHERE), _files.open_bytes(path) as file:
+    with _files.corrupt_named(path.name), _files.open_bytes(path) as file:
         _check_las_size(file, path)
         cloud = laspy.read(file)
         position = np.array(cloud.xyz, dtype=np.float64)
     system = _reference_system(cloud.header.vlrs)
-    with Problems(WHERE, UnreadableFile) as problems:
+    with Problems("", UnreadableFile) as problems:
         expected = f"projected coordinates; {PROJECT}"
         problems.require(system != "degree", "path", expected, "longitudes and latitudes")
         problems.require(system != "foot", "path", "coordinates in metres; convert it first", "feet")
@@ -285,7 +282,7 @@ def _check_las_size(file: IO[bytes], path: Path) -> None:
     file.seek(0)
     header = laspy.LasHeader.read_from(file)
     stated = header.point_count * header.point_format.size
-    require_unpacked(WHERE, path.name, stated, unpacked_limit(size, _files.RATIO))
+    require_unpacked("", path.name, stated, unpacked_limit(size, _files.RATIO))
     if header.are_points_compressed:
         (table,) = _unpacked("<q", file, header.offset_to_point_data)
         if table == -1:  # written to a stream: the place of the table ends the file

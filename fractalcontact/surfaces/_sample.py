@@ -14,8 +14,8 @@ from fractalcontact.base.errors import UnreadableFile
 from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.provenance import file_checksum
 from fractalcontact.base.results import public_result
-from fractalcontact.base.validation import Problems
-from fractalcontact.surfaces._files import Request
+from fractalcontact.base.validation import Problems, Words
+from fractalcontact.surfaces._files import Request, require_readable
 from fractalcontact.surfaces._from_array import labelled_heights
 from fractalcontact.surfaces._read import file_content
 
@@ -117,14 +117,12 @@ def sample(name: str) -> xr.DataArray:
 def _measured(name: str) -> xr.DataArray:
     entry, folder = MEASURED[name], os.environ.get(FOLDER, "")
     path = Path(folder) / f"{name}.npy"
-    where = "fractalcontact.surfaces.sample"
     if not folder or not path.is_file():
         expected = f"the file {path.name} in the folder that the environment variable {FOLDER} names"
-        raise UnreadableFile(where, [f"name: expected {expected}; made from {entry.source}"])
+        raise UnreadableFile("", [f"name: expected {expected}; made from {entry.source}"])
     checksum = file_checksum(path)
-    if checksum != entry.sha256:
-        message = f"name: expected {path.name} with the SHA-256 {entry.sha256}, got {checksum}"
-        raise UnreadableFile(where, [message])
+    expected = f"{path.name} with the SHA-256 {entry.sha256}"
+    require_readable(checksum == entry.sha256, "name", expected, Words(checksum))
     surface = labelled_heights(np.load(path, allow_pickle=False), entry.spacing)
     source = f"{path.name}: {entry.source}"
     surface.attrs = {"title": entry.title, "source_file": source, "file_sha256": checksum}
