@@ -165,7 +165,8 @@ def _run_on_workers(
             while True:
                 while not stop and len(running) < workers.count and (entry := next(waiting, None)):
                     key, task = entry
-                    running[workers.executor.submit(_WorkerTask(task, store, mark, workers.local))] = key
+                    kept = {} if workers.local else store.kept(getattr(task, "digests", ()))
+                    running[workers.executor.submit(_run_here, task, store, kept, mark)] = key
                 if not running:
                     return
                 if stop and mark is not None:
@@ -198,24 +199,18 @@ def _mark(store: PartStore) -> Iterator[Path | None]:
         mark.unlink(missing_ok=True)
 
 
-class _WorkerTask:
-    """A task as it is sent to a worker."""
+def _run_here(
+    task: Task[R], store: PartStore, kept: Mapping[str, Any], mark: Path | None
+) -> tuple[R | None, Mapping[str, Any]]:
+    """Run a task on a worker; return its result, and its new parts if the worker does not see the folder.
 
-    def __init__(self, task: Task[Any], store: PartStore, mark: Path | None, local: bool) -> None:
-        self.task, self.store, self.mark = task, store, mark
-        self.kept = {} if local else store.kept(getattr(task, "digests", ()))
-
-    def __call__(self) -> tuple[Any, Mapping[str, Any]]:
-        """Return the result, and the new parts where the worker has no access to the folder of the run.
-
-        The worker may run as many tasks as it has threads: each uses one, unless the environment
-        variable `FRACTALCONTACT_THREADS` sets more.
-        """
-        has_access = self.mark is None or self.mark.is_file()
-        store = self.store if has_access else MemoryStore(self.kept)
-        with resources.limit(resources.requested_count() or 1):
-            result = self.task(store, _MarkedStop(self.mark))
-        return result, store.added if isinstance(store, MemoryStore) else {}
+    The worker may run as many tasks as it has threads: each uses one, unless the environment variable
+    `FRACTALCONTACT_THREADS` sets more.
+    """
+    store = store if mark is None or mark.is_file() else MemoryStore(kept)
+    with resources.limit(resources.requested_count() or 1):
+        result = task(store, _MarkedStop(mark))
+    return result, store.added if isinstance(store, MemoryStore) else {}
 
 
 class _MarkedStop(signals.Stop):

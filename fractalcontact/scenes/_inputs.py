@@ -67,9 +67,9 @@ def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None =
         done.append(f"{_points(surface['filled_points'])} filled in")
     if table.level is not None:
         tilt = math.degrees(math.atan(math.hypot(*slopes(surface.values, read_grid(surface).spacing))))
-        before = rms_height(surface)
+        before = float(surface.std())
         surface = surfaces.level(surface, table.level)
-        ends = [quantity_text(height, "m") for height in (before, rms_height(surface))]
+        ends = [quantity_text(height, "m") for height in (before, float(surface.std()))]
         if table.level > 0:
             done.append(f"levelled: tilt {tilt:.3g}° removed, Sq {ends[0]} before and {ends[1]} after")
     return surface.assign_attrs(references=source, **({"preparation": ", ".join(done)} if done else {}))
@@ -79,19 +79,14 @@ def _points(count: Any) -> str:
     return f"{int(count)} point" + ("s" if int(count) != 1 else "")
 
 
-def rms_height(surface: xr.DataArray) -> float:
-    """Return the root mean square height about the mean (m)."""
-    return float(surface.std())
-
-
 def plane_share(surface: xr.DataArray) -> float:
     """Return the part of the mean square height that the mean plane carries."""
-    total = rms_height(surface)
+    total = float(surface.std())
     if not total > 0:
         return 0.0
     slope_y, slope_x = slopes(surface.values, read_grid(surface).spacing)
     plane = slope_y * surface["y"] + slope_x * surface["x"] + 0.0 * surface
-    return (rms_height(plane) / total) ** 2
+    return (float(plane.std()) / total) ** 2
 
 
 def generator_options(table: SurfaceTable) -> dict[str, Any]:

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import xarray as xr
@@ -134,7 +133,7 @@ def run(
                 tree, whole = _run_scans(scene, scans, folder, progress, among, start)
             else:
                 with locked(folder), signals.noted(folder is not None) as stop:
-                    tree, whole = _run(scene, folder, progress, among, start, stop, faces=faces)
+                    tree, whole = _run(scene, folder, progress, among, start, stop, faces)
     if summary:
         print((whole or summary_of(tree)).text(verbose=verbose))  # noqa: T201
     return tree
@@ -181,7 +180,7 @@ def _run_scans(
         return tree, whole
 
 
-def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[str, str]) -> xr.DataTree:
+def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, digest: str) -> xr.DataTree:
     """Study one scan in a folder of its own; `completeness` of the result states which stages failed and why.
 
     It is not validated beforehand: what does not fit this scan fails in its stage, and the others go on.
@@ -193,7 +192,7 @@ def _study_scan(scene: Scene, folder: Path, stop: signals.Stop, facts: Mapping[s
         check_memory(scene, stages_of(scene), face=face)
         folder.mkdir(exist_ok=True)
         with locked(folder):
-            return _run(scene, folder, False, None, start, stop, facts, {"surface": face})[0]
+            return _run(scene, folder, False, None, start, stop, {"surface": face}, digest)[0]
 
 
 def _run(
@@ -203,17 +202,17 @@ def _run(
     workers: Workers | None,
     start: float,
     stop: signals.Stop,
-    facts: Mapping[str, str] = MappingProxyType({}),
-    faces: Mapping[str, xr.DataArray] = MappingProxyType({}),
+    faces: Mapping[str, xr.DataArray],
+    digest: str = "",
 ) -> tuple[xr.DataTree, Summary | None]:
     """Return the results, and the summary where the report computed it; `faces` have been read.
 
-    One of many scans, whose `facts` mark it as finished, goes on without stages that fail.
+    One of many scans, whose `digest` marks it as finished, goes on without stages that fail.
     """
     store = PartStore(folder)
     scene = with_seeds(scene, store)
     if scene.surface.members is None:
-        study = Study(scene, store, progress, workers, goes_on=bool(facts), faces=faces).run(stop)
+        study = Study(scene, store, progress, workers, goes_on=bool(digest), faces=faces).run(stop)
     else:
         study = study_ensemble(scene, store, progress, workers, stop)
     if stop and scene.want.figures:
@@ -224,8 +223,8 @@ def _run(
         if name in study.groups:
             warn_of_result(name, study.groups[name])
     tree = _result_tree.result_tree(scene, study)
-    if not study.failures:
-        tree.attrs.update(facts)
+    if digest and not study.failures:
+        tree.attrs[DIGEST] = digest
     _result_tree.note_run_time(tree, start)
     if folder is None:
         return tree, None
@@ -328,7 +327,7 @@ class _ScanTask:
                 return "", _numbers(netcdf.open(self.folder / RESULT))
             for name in (RESULT, REPORT):
                 (self.folder / name).unlink(missing_ok=True)
-            tree = _study_scan(self.scene, self.folder, stop, {DIGEST: digest})
+            tree = _study_scan(self.scene, self.folder, stop, digest)
             return str(tree.attrs.get("completeness", "")).removeprefix(_result_tree.PARTIAL), _numbers(tree)
         except signals.Stopped:
             return None

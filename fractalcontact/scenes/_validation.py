@@ -212,16 +212,9 @@ def _flat_surface(table: SurfaceTable) -> xr.DataArray | None:
         return None
     needed = 24.0 * sum(shape)  # bytes of a coordinate while it is made
     require_memory("surface", needed, f"the coordinates of {shape[0]} x {shape[1]} points")
-    return _zeros(shape, np.broadcast_to(table.options["spacing"], 2).tolist())
-
-
-def _zeros(
-    shape: Sequence[int], spacing: Sequence[float], periodic: Sequence[bool] = (False, False)
-) -> xr.DataArray:
-    """Return a surface of zeros that is one number in memory, whatever its size."""
-    coords = plane_coords(shape, spacing, periodic)
-    zeros = xr.DataArray(np.broadcast_to(0.0, shape), dims=("y", "x"), coords=coords, name="height")
-    return label(zeros)
+    coords = plane_coords(shape, np.broadcast_to(table.options["spacing"], 2).tolist(), (False, False))
+    # one number in memory, whatever its size
+    return label(xr.DataArray(np.broadcast_to(0.0, shape), coords, ("y", "x"), name="height"))
 
 
 def _valid_crack(scene: Scene, surfaces: dict[str, xr.DataArray], problems: Problems) -> Crack | None:
@@ -271,31 +264,27 @@ def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
         public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 
 
-def _empty_gap(scene: Scene, crack: Crack) -> xr.DataArray:
-    """Return openings of zero on the block, along the load path of the closure, whatever its load."""
-    rows, columns = crack.layout.slices
-    block = crack.lower.isel(y=rows, x=columns)
-    gap = block.copy(data=np.broadcast_to(0.0, block.shape))
+def _empty_maps(
+    scene: Scene, surface: xr.DataArray | None, crack: Crack | None, row: StageType
+) -> xr.DataArray | None:
+    """Return maps of zeros on the grid of the contact, that of the surface or of the block.
+
+    States have two steps, and gaps the load path of the closure, whatever its load.
+    """
+    plane = surface if scene.is_pressed and row.reads == "state" else None
+    if plane is None and crack is not None:
+        rows, columns = crack.layout.slices
+        plane = crack.lower.isel(y=rows, x=columns)
+    if plane is None:
+        return None
+    if row.reads == "state":
+        return plane.copy(data=np.broadcast_to(False, plane.shape)).expand_dims(step=2)
     options = _inputs.stage_options(scene, STAGES["joints/closure"])
     path = next((real_numbers(options[key]) for key in LOADS if key in options), None)
     if path is None or path.ndim > 1:  # a problem of the closure, which is listed there
         path = np.zeros(1)
-    return gap.expand_dims(step=path.size).assign_coords(nominal_pressure=("step", path.astype(float)))
-
-
-def _empty_maps(
-    scene: Scene, surface: xr.DataArray | None, crack: Crack | None, row: StageType
-) -> xr.DataArray | None:
-    """Return zeros over two steps on the grid of the contact: that of the surface, or of the block."""
-    if row.reads == "gap" and crack is not None:
-        return _empty_gap(scene, crack)
-    if surface is None or not (scene.is_pressed or crack is not None):
-        return None
-    grid = read_grid(surface)
-    cells = grid.shape if scene.is_pressed else _inputs.block_shape(scene, grid.shape, grid.spacing)
-    is_surface = scene.is_pressed or scene.joint.block is None
-    maps = _zeros(cells, grid.spacing, [is_surface and wraps for wraps in grid.periodic])
-    return maps.copy(data=np.broadcast_to(False, cells)).expand_dims(step=2)
+    gap = plane.copy(data=np.broadcast_to(0.0, plane.shape)).expand_dims(step=path.size)
+    return gap.assign_coords(nominal_pressure=("step", path.astype(float)))
 
 
 def _rms_slope(heights: np.ndarray[Any, Any], spacing: Sequence[float]) -> float:

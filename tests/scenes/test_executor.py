@@ -42,10 +42,10 @@ class Remote(Executor):
             return future
         if number == self.stop_at:
             signal.raise_signal(signal.SIGINT)
-        task = pickle.loads(pickle.dumps(function))
-        self.kept.append(task.kept)
-        task.mark = task.mark and task.mark.with_name("of another machine")
-        future.set_result(pickle.loads(pickle.dumps(task(*arguments))))
+        task, store, kept, mark = pickle.loads(pickle.dumps(arguments))
+        self.kept.append(kept)
+        mark = mark and mark.with_name("of another machine")
+        future.set_result(pickle.loads(pickle.dumps(function(task, store, kept, mark))))
         return future
 
 
