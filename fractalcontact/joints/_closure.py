@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import is_single, read_directions
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import DEFAULT_TOLERANCE, STOP_REASONS
+from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._crack import Crack, check_sliding
@@ -23,6 +22,7 @@ from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, che
 
 Path = float | Sequence[float] | Array
 
+OF_FORCES = ("normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement")
 UNDETERMINED = (
     "NaN where periodic faces are closed to the mean plane of the delta-surface or beyond: "
     "no force is then determined"
@@ -34,7 +34,12 @@ def _check(problems: Problems) -> None:
     check_pressing(problems)
 
 
-@public_result(title="closure of a sheared crack", check=_check, memory=PRESSING_BYTES)
+@public_result(
+    title="closure of a sheared crack",
+    reasons=dict.fromkeys(OF_FORCES, UNDETERMINED),
+    check=_check,
+    memory=PRESSING_BYTES,
+)
 def closure(
     crack: Crack,
     *,
@@ -120,19 +125,7 @@ def closure(
     )
     result = pressed_dataset(pressing, shears, directions, progress)
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
-    if is_single(direction):
-        result = result.isel(direction=0)
-    _explain_undetermined(result)
-    return result
-
-
-def _explain_undetermined(result: xr.Dataset) -> None:
-    """Add the reason where an elastic body does not determine the force."""
-    if bool((result["stop_reason"] == STOP_REASONS["beyond_full_contact"]).any()):
-        for name, variable in result.variables.items():
-            is_measured = "step" in variable.dims and variable.dtype.kind == "f"
-            if is_measured and bool(np.isnan(variable.values).any()):
-                result[name].attrs["reason"] = UNDETERMINED
+    return result.isel(direction=0) if is_single(direction) else result
 
 
 def _check_bandis(problems: Problems) -> None:

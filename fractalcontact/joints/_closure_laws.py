@@ -146,13 +146,12 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
         of_steps = {"stiffness": stiffness(p, w, rounding), "seated_closure": counted}
         paths.append(fit_laws(p, counted, seat, rounding) | of_steps)
     variables: dict[str, Any] = {}
-    for name in (*FITS, *ENDS, "law_score", "preferred_law", "stiffness", "seated_closure"):
+    of_seat = () if seat is None else ("seated_closure",)
+    for name in (*FITS, *ENDS, "law_score", "preferred_law", "stiffness", *of_seat):
         dims = interface.dims if name in ("stiffness", "seated_closure") else outer
         values = np.array([path[name] for path in paths])
         variables[name] = dims, values.reshape([interface.sizes[dim] for dim in dims])
-    if seat is None:
-        del variables["seated_closure"]
-    else:
+    if seat is not None:
         variables["seating_pressure"] = (), seat
     result = xr.Dataset(variables, leading_coords(closure, interface.dims, taken=(*variables, "run_time")))
     result["preferred_law"].attrs["comment"] = PREFERENCE
@@ -357,17 +356,10 @@ def _hyperbola_ends(
     smallest, largest = middle - margin, middle + margin
     with np.errstate(divide="ignore"):
         stiffest = np.where(smallest > 0, halves / smallest, math.inf)
-    ends = [
-        float(np.min(halves / largest)),
-        float(stiffest.max()),
-        float(smallest.min()),
-        float(largest.max()),
-    ]
-    if math.isnan(low):  # the closure may be complete at once
-        ends[0] = 0.0
-    if math.isnan(high):  # or never
-        ends[3] = math.inf
-    return ends[0], ends[1], max(ends[2], 0.0), ends[3]
+    # the closure may be complete at once, or never
+    softest = 0.0 if math.isnan(low) else float(np.min(halves / largest))
+    greatest = math.inf if math.isnan(high) else float(largest.max())
+    return softest, float(stiffest.max()), max(float(smallest.min()), 0.0), greatest
 
 
 def stiffness(pressure: Array, closure: Array, rounding: float) -> Array:

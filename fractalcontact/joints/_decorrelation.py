@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,7 @@ from fractalcontact.base.study import PAPER
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, missing_heights
+from fractalcontact.joints._sheared_contact import stacked
 
 THRESHOLD = math.exp(-1.0)  # correlation, over that at no shear, that defines the decorrelation length
 
@@ -113,27 +115,19 @@ def decorrelation_length(
     """
     directions = read_directions(direction)
     shears = _whole_cell_shears(crack, directions) if shear is None else float_array(shear)
-    correlations, variances, lengths = [], [], []
+    rows: list[dict[str, Any]] = []
     for towards in directions:
         sums, variance = _crack_sums(crack, shears, towards)
-        correlations.append(sums.correlation(np.ones(sums.product.shape[1])))
-        variances.append(variance)
-        lengths.append(estimate_length(sums, shears, min(crack.block)))
-    dims = ("direction", "shear")
+        correlation = sums.correlation(np.ones(sums.product.shape[1]))
+        length = estimate_length(sums, shears, min(crack.block))
+        rows.append({"correlation": correlation, "structure_function": variance} | length._asdict())
     result = xr.Dataset(
-        {
-            "correlation": (dims, np.stack(correlations)),
-            "structure_function": (dims, np.stack(variances)),
-            "decorrelation_length": ("direction", [length.value for length in lengths]),
-            "decorrelation_length_low": ("direction", [length.low for length in lengths]),
-            "decorrelation_length_high": ("direction", [length.high for length in lengths]),
-            "missing_reason": ("direction", np.array([length.reason for length in lengths])),
-        },
+        {name: (("direction", "shear")[: values.ndim], values) for name, values in stacked(rows).items()},
         coords={"shear": ("shear", shears), **direction_coords(directions)},
         attrs={"correlation_threshold": THRESHOLD},
     )
-    reasons = [f"{towards.name}: {length.reason}" for towards, length in zip(directions, lengths, strict=True)
-               if length.reason]  # fmt: skip
+    found = zip(directions, (row["missing_reason"] for row in rows), strict=True)
+    reasons = [f"{towards.name}: {reason}" for towards, reason in found if reason]
     for name in ("decorrelation_length", "decorrelation_length_low", "decorrelation_length_high"):
         if reasons and bool(result[name].isnull().any()):
             result[name].attrs["reason"] = f"NaN: {'; '.join(reasons)}"
@@ -188,14 +182,13 @@ class TileSums:
             return np.asarray(product / np.sqrt(lower * upper))
 
 
-@dataclass(frozen=True)
-class Length:
+class Length(NamedTuple):
     """Decorrelation length with its 95 % interval, or the reason why one is missing."""
 
-    value: float
-    low: float = math.nan
-    high: float = math.nan
-    reason: str = ""
+    decorrelation_length: float
+    decorrelation_length_low: float = math.nan
+    decorrelation_length_high: float = math.nan
+    missing_reason: str = ""
 
 
 def tile_sums(lower: Array, upper: Array, block: Block, shears: Array, unit: Pair) -> tuple[TileSums, Array]:
@@ -245,19 +238,21 @@ def estimate_length(
     correlation = sums.correlation(np.ones(tiles))
     value = _crossing(correlation, shears)
     if not np.isfinite(correlation[0]):
-        return Length(math.nan, reason="the faces are planes")
+        return Length(math.nan, missing_reason="the faces are planes")
     if math.isnan(value):
-        return Length(value, reason="the faces are still correlated at the greatest shear")
+        return Length(value, missing_reason="the faces are still correlated at the greatest shear")
     if value < shears[1]:
-        return Length(value, reason="no interval: the length is below the first shear")
+        return Length(value, missing_reason="no interval: the length is below the first shear")
     if tiles < FINE * FINE:
-        return Length(value, reason="no interval: the block has too few cells")
+        return Length(value, missing_reason="no interval: the block has too few cells")
     if edge < fewest * value:
-        return Length(value, reason=f"no interval: the block is less than {fewest:g} lengths wide")
+        return Length(value, missing_reason=f"no interval: the block is less than {fewest:g} lengths wide")
     fine, coarse = (_jackknife_variance(sums, shears, side) for side in (FINE, COARSE))
     half_width = quantile * math.sqrt(max(2.0 * coarse - fine, coarse))
     if not math.isfinite(half_width):
-        return Length(value, reason="no interval: without a part of the block the faces stay correlated")
+        return Length(
+            value, missing_reason="no interval: without a part of the block the faces stay correlated"
+        )
     return Length(value, value * math.exp(-half_width), value * math.exp(half_width))
 
 

@@ -7,6 +7,7 @@ through the heights, whose error for a wave of wavenumber k falls as (k * spacin
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -125,17 +126,17 @@ def interpolation_errors(crack: Crack, shears: Array, directions: Sequence[Direc
     otherwise that of the spline half way between two points.
     """
     layout, face = crack.layout, crack.faces()[0]
-    axis_squares: dict[int, float] = {}
-    squares = np.zeros((len(directions), shears.size))
-    for i, direction in enumerate(directions):
-        for j, shear in enumerate(shears):
-            for axis, cells in enumerate(layout.shift(float(shear), direction.unit)):
-                if cells == np.floor(cells) or layout.wraps[axis]:
-                    continue
-                if axis not in axis_squares:
-                    axis_squares[axis] = spline_error(face, axis) ** 2
-                squares[i, j] += axis_squares[axis]
-    return np.sqrt(squares)
+
+    @functools.cache
+    def between_points(axis: int) -> float:
+        return spline_error(face, axis)
+
+    def error(shear: float, direction: Direction) -> float:
+        shift = layout.shift(shear, direction.unit)
+        inexact = [axis for axis in (0, 1) if shift[axis] % 1.0 != 0.0 and not layout.wraps[axis]]
+        return math.sqrt(sum(between_points(axis) ** 2 for axis in inexact))
+
+    return np.array([[error(float(shear), direction) for shear in shears] for direction in directions])
 
 
 def heights_under(face: Array, block: Block, shift: Pair) -> Array:

@@ -193,11 +193,8 @@ def _measured(surface: xr.DataArray | None, direction: Any) -> dict[str, xr.Data
         return {}
     jrc = measured_coefficient(surface, direction=direction)
     facets = directional_roughness(surface, direction=direction)
-    names = ("area_fraction", "shape", "theta_max")
-    return {
-        "roughness_coefficient": jrc["roughness_coefficient"],
-        "asperity_angle": facets["mean_dip"],
-    } | {name: facets[name] for name in names}
+    measured = {"roughness_coefficient": jrc["roughness_coefficient"], "asperity_angle": facets["mean_dip"]}
+    return measured | {name: facets[name] for name in ("area_fraction", "shape", "theta_max")}
 
 
 def _explain(result: xr.Dataset, has_surface: bool) -> None:

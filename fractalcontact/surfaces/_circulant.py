@@ -113,11 +113,8 @@ def _embed(shape: tuple[int, int], spacing: tuple[float, float], hurst: float) -
             f"fractional Brownian surface: the embedding of shape {shape} with hurst = {hurst:g} is not "
             f"positive definite (smallest over largest eigenvalue {smallest / largest:.2g}): please report it"
         )
-    clipped = 0.0
-    if smallest < 0.0:
-        clipped = float(np.count_nonzero(eigenvalues < 0.0) / eigenvalues.size)
-        np.maximum(eigenvalues, 0.0, out=eigenvalues)
-    amplitude = np.sqrt(eigenvalues, out=eigenvalues)
+    clipped = float(np.count_nonzero(eigenvalues < 0.0) / eigenvalues.size)
+    amplitude = np.sqrt(np.maximum(eigenvalues, 0.0, out=eigenvalues), out=eigenvalues)
     amplitude.flags.writeable = False
     drift = float(np.sqrt(2.0 * model.c2))
     return Embedding(shape, torus, step, amplitude, drift, smallest / largest, clipped)

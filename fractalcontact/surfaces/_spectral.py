@@ -28,6 +28,7 @@ JACOBS = (
 # modes drawn at a time, which bounds the memory; their order depends on it. 2^13 to 2^20 take the same time
 # within a tenth for 1024 x 1024 points
 BLOCK = 1 << 15
+Cutoffs = dict[str, float | None]  # long_cutoff, rolloff and short_cutoff, in m
 
 
 def _check(problems: Problems) -> None:
@@ -43,7 +44,7 @@ def _check(problems: Problems) -> None:
     cutoffs = {name: getattr(given, name) for name in ("long_cutoff", "rolloff", "short_cutoff")}
     valid_cutoffs = [_from_array.check_length(problems, name, optional=True) for name in cutoffs]
     if valid_plane and all(valid_cutoffs):
-        _check_order(problems)
+        _check_order(problems, cutoffs)
     problems.choice("normalise", among=("realisation", "expectation"))
     check_direction(problems)
     # beyond the ratio of extent to spacing of any grid
@@ -62,13 +63,11 @@ def _check(problems: Problems) -> None:
         _check_modes(problems, band, given.shape, given.spacing)
 
 
-def _check_order(problems: Problems) -> None:
+def _check_order(problems: Problems, cutoffs: Cutoffs) -> None:
     """Check that short_cutoff <= rolloff <= long_cutoff and that the grid resolves the short cut-off."""
     given = problems.given
     sizes, steps = _from_array.sizes_and_steps(given.shape, given.spacing)
-    longest, corner, shortest = _wavelengths(
-        sizes, steps, given.long_cutoff, given.rolloff, given.short_cutoff
-    )
+    longest, corner, shortest = _wavelengths(sizes, steps, cutoffs)
     if given.short_cutoff is not None:
         least = 2.0 * min(steps)
         expected = f"at least two spacings, {least:g} m"
@@ -173,18 +172,12 @@ def spectral(
     return _from_array.draw_ensemble(draw_heights, steps, members=members, rng=rng, periodic=True)
 
 
-def _wavelengths(
-    sizes: Sequence[int],
-    steps: Sequence[float],
-    long_cutoff: float | None,
-    rolloff: float | None,
-    short_cutoff: float | None,
-) -> tuple[float, float, float]:
+def _wavelengths(sizes: Sequence[int], steps: Sequence[float], cutoffs: Cutoffs) -> tuple[float, ...]:
     """Return the three wavelengths of the band in metres; inf and 0 where there is no cut-off."""
     extent = max(n * step for n, step in zip(sizes, steps, strict=True))
-    longest = math.inf if long_cutoff is None else float(long_cutoff)
-    corner = min(longest, extent) if rolloff is None else float(rolloff)
-    shortest = 0.0 if short_cutoff is None else float(short_cutoff)
+    longest = math.inf if cutoffs["long_cutoff"] is None else float(cutoffs["long_cutoff"])
+    corner = min(longest, extent) if cutoffs["rolloff"] is None else float(cutoffs["rolloff"])
+    shortest = 0.0 if cutoffs["short_cutoff"] is None else float(cutoffs["short_cutoff"])
     return longest, corner, shortest
 
 
@@ -258,7 +251,7 @@ class _Band:
         shape: Any,
         spacing: Any,
         hurst: Any,
-        cutoffs: dict[str, float | None],
+        cutoffs: Cutoffs,
         anisotropy_ratio: float,
         direction: str | float,
     ) -> _Band:
@@ -267,18 +260,11 @@ class _Band:
         unit = power_of_two(max(steps))
         low, corner, high = (
             2.0 * math.pi / (length / unit) if length > 0 else math.inf
-            for length in _wavelengths(sizes, steps, **cutoffs)
+            for length in _wavelengths(sizes, steps, cutoffs)
         )
-        exponents = float_array(hurst)
-        return cls(
-            (float(exponents[0]), float(exponents[-1])),
-            low,
-            corner,
-            high,
-            float(anisotropy_ratio),
-            math.radians(read_direction(direction).azimuth),
-            len(sizes),
-        )
+        exponents, azimuth = float_array(hurst), math.radians(read_direction(direction).azimuth)
+        both = float(exponents[0]), float(exponents[-1])
+        return cls(both, low, corner, high, float(anisotropy_ratio), azimuth, len(sizes))
 
     @property
     def mean_hurst(self) -> float:
