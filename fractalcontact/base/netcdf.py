@@ -269,8 +269,8 @@ def _write(groups: Mapping[str, xr.Dataset], file: Any) -> None:
     writer.sync()  # type: ignore[no-untyped-call]
 
 
-def _read(path: Path, dims: frozenset[str] = frozenset()) -> dict[str, xr.Dataset]:
-    """Return the groups of a file in memory, with the variables over all these dims."""
+def _read(path: Path) -> dict[str, xr.Dataset]:
+    """Return the groups of a file in memory."""
     import netCDF4
     from xarray.backends import NetCDF4DataStore
 
@@ -284,9 +284,7 @@ def _read(path: Path, dims: frozenset[str] = frozenset()) -> dict[str, xr.Datase
         for group in groups_in(file):
             store = NetCDF4DataStore(file, group=group.path, lock=False)  # type: ignore[no-untyped-call]
             # `open_dataset` would import every library on this machine that adds a file format to xarray
-            stored = xr.decode_cf(store)
-            chosen = [name for name, variable in stored.data_vars.items() if dims <= set(variable.dims)]
-            groups[group.path] = (stored[chosen] if dims else stored).load()
+            groups[group.path] = xr.decode_cf(store).load()
             groups[group.path].set_close(None)
     return groups
 
@@ -332,11 +330,6 @@ def _failure_reason(folder: Path, error: Exception) -> str:
             return "no space left on the device"
     reason = getattr(error, "strerror", None) or str(error)
     return reason if isinstance(error, OSError) else f"the file could not be completed ({reason})"
-
-
-def groups_over(path: Path, dims: frozenset[str]) -> dict[str, xr.Dataset]:
-    """Return the groups of a file that have variables over all these dims, with these alone."""
-    return {name: _as_saved(dataset) for name, dataset in _read(path, dims).items() if dataset.data_vars}
 
 
 def _as_saved(dataset: xr.Dataset) -> xr.Dataset:

@@ -122,12 +122,11 @@ def report(
         problems.require(is_free, "path", "a new file, or a report of this package", target.name)
     tree = tree.filter(lambda node: not node.path.startswith(f"/{SCANS}/"))  # each has a page of its own
     with writing(WHERE, "path", target), tempfile.TemporaryDirectory() as folder:
-        files: Sequence[str | os.PathLike[str]] | None = figures
-        if files is None:
+        if figures is None:
             from fractalcontact import plotting  # only here: `run` has drawn them
 
-            files = plotting.draw(pictured(tree), folder)
-        return write_report(tree, target, files, summary_of(tree))
+            figures = plotting.draw(pictured(tree), folder)
+        return write_report(tree, target, figures, summary_of(tree))
 
 
 def write_report(

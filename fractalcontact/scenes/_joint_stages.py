@@ -242,7 +242,7 @@ def _limits_of_uplift(_: xr.DataTree, water: xr.Dataset) -> Iterator[str]:
     forces = water["uplift_force"]
     with np.errstate(divide="ignore", invalid="ignore"):
         more = forces.sel(diagram="joint") / forces.drop_sel(diagram="joint") - 1.0
-    largest = float(more.where(np.isfinite(more)).max())
+    largest = finite(more).max(initial=0.0)
     if largest > 0:
         yield (
             f"the diagrams are NOT on the safe side: the joint has up to {100 * largest:.1f} % more uplift."

@@ -30,7 +30,7 @@ PARTIAL = "partial: "  # start of the attribute `completeness`
 
 def result_tree(scene: Scene, study: StudyResults, main: xr.Dataset | None = None) -> xr.DataTree:
     """Return the finished results as a tree that states what is missing; in its root the `main` ones."""
-    own = in_words(main_results(study.groups), with_group=True) if main is None else main
+    own = main_results(study.groups) if main is None else main
     groups = {"/": own} | {f"/{name}": result for name, result in study.groups.items()}
     description = groups.pop("/surfaces/description", None)
     if description is not None:
@@ -155,9 +155,8 @@ _ROWS = Rows(
 def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the numbers that stand for a study: dimensions of the first method, else the largest values.
 
-    Of an ensemble they are means over the members, of many scans values along `scan`. The attributes `over`
-    and `group` are the dims over which each is the largest and the group that it is from; `in_words` puts
-    them into the names.
+    Of an ensemble they are means over the members, of many scans values along `scan`. Their names say over
+    which dims they are the largest, and of which group.
     """
     main: dict[str, xr.DataArray] = {}
     for entry in MAIN:
@@ -168,19 +167,10 @@ def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
                 others = [str(dim) for dim in values.dims if dim not in (MEMBER, SCAN)]
                 number = values.max(others) if others else values
                 number = number.mean(MEMBER) if MEMBER in number.dims else number
-                attributes = {"long_name": name} | values.attrs | {"over": others, "group": group}
-                main[name] = number.reset_coords(drop=True).assign_attrs(attributes)
+                largest = f": the largest over {', '.join(others)}" if others else ""
+                words = f"{values.attrs.get('long_name', name)}{largest}, of the group {group}"
+                main[name] = number.reset_coords(drop=True).assign_attrs(values.attrs, long_name=words)
     return xr.Dataset(main)
-
-
-def in_words(main: xr.Dataset, *, with_group: bool) -> xr.Dataset:
-    """Return main results whose names say over which dims they are the largest, and of which group."""
-    described = main.copy()
-    for values in described.data_vars.values():
-        over, group = values.attrs.pop("over"), values.attrs.pop("group")
-        largest = f": the largest over {', '.join(over)}" if over else ""
-        values.attrs["long_name"] += largest + (f", of the group {group}" if with_group else "")
-    return described
 
 
 def tree_of_scans(scene: Scene, reasons: Mapping[str, str], numbers: Mapping[str, Numbers]) -> xr.DataTree:
@@ -194,18 +184,18 @@ def tree_of_scans(scene: Scene, reasons: Mapping[str, str], numbers: Mapping[str
         having = {name: each[path] for name, each in numbers.items() if path in each}
         if any(data.data_vars for data in having.values()):
             groups[path] = stacked(having, SCAN)
-    main = groups[OVERVIEW].merge(main_results(groups), join="left")
+    overview = groups[OVERVIEW].merge(main_results(groups), join="left")
+    means = pooled(overview)
     done = {name: "incomplete" if reasons[name] else "done" for name in numbers}
     caveats = {name: str(each[""].attrs.get("caveats", "none")) for name, each in numbers.items()}
     found = [caveats.get(name, "none") for name in reasons]
-    overview = in_words(main, with_group=False)
     overview["status"] = (SCAN, [done.get(name, "failed") for name in reasons])
     overview["reason"] = (SCAN, list(reasons.values()), {"long_name": "why it failed"})
     overview["caveats"] = (SCAN, ["" if text == "none" else text for text in found])
     groups[OVERVIEW] = schema.label(overview)
     stages = (provenance_of(each[""]).get("stages", {}).items() for each in numbers.values())
     seconds = total_seconds({name: facts["run_time"] for name, facts in each} for each in stages)
-    tree = result_tree(scene, StudyResults(groups, seconds), pooled(main))
+    tree = result_tree(scene, StudyResults(groups, seconds), means)
     tree.attrs["caveats"] = "none"  # the overview has those of each
     return tree
 

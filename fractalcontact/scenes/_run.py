@@ -371,8 +371,12 @@ def _study_scans(
     return studied
 
 
-def _maps_of_scans(place: Path, names: Iterable[str]) -> Iterator[dict[str, xr.Dataset]]:
+def _maps_of_scans(place: Path, names: Iterable[str]) -> Iterator[Numbers]:
     """Yield the groups that have the maps of each scan."""
     for folder in map(folder_of, names):
-        maps = netcdf.groups_over(place / folder / RESULT, MAP_DIMS)
-        yield {f"/{SCANS}/{folder}{path}": each for path, each in maps.items()}
+        groups = {}
+        for node in netcdf.open(place / folder / RESULT).subtree:
+            maps = [name for name, each in node.data_vars.items() if set(each.dims) >= MAP_DIMS]
+            if maps:
+                groups[f"/{SCANS}/{folder}{node.path}"] = node.to_dataset(inherit=False)[maps]
+        yield groups

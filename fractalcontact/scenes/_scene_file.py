@@ -16,7 +16,7 @@ import numpy as np
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
 from fractalcontact.base.files import datasets_folder, files_of, is_pattern
 from fractalcontact.base.units import pascals
-from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean
+from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean, reading
 from fractalcontact.scenes import _scene_keys
 from fractalcontact.scenes._inputs import FROM_MATERIAL, given_options, loads_of
 from fractalcontact.scenes._results_folder import folder_of
@@ -133,11 +133,9 @@ def _text(source: Path, size: int = 1 << 20, parts: int = 32) -> str:
 
 
 def _find(path: Path) -> Path:
-    try:
+    with reading("scene", path):  # a folder on the way may not be searched
         if path.is_file():
             return path
-    except OSError as error:  # a folder on the way may not be searched
-        raise UnreadableFile("scene", [f"path: {path.name!r}: {error.strerror}"]) from error
     shipped = datasets_folder() / f"{path.name.removesuffix('.toml')}.toml"
     if path.parent.name in ("", "datasets") and shipped.is_file():
         return shipped
