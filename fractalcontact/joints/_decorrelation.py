@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +34,8 @@ THRESHOLD = math.exp(-1.0)  # correlation, over that at no shear, that defines t
 # tiles along an edge of the block; on eight intervals 6 and 3 changed the width by .66 to 1.9 times, 12 and 4
 # by .93 to 1.03, 16 and 8 by .67 to 1.25; coverage was checked with these
 FINE, COARSE = 8, 4
+# over every tile, shape (shear, tile): products of facing heights, squares of the lower and the upper ones
+Sums = tuple[Array, Array, Array]
 
 
 def _check(problems: Problems) -> None:
@@ -118,7 +119,7 @@ def decorrelation_length(
     rows: list[dict[str, Any]] = []
     for towards in directions:
         sums, variance = _crack_sums(crack, shears, towards)
-        correlation = sums.correlation(np.ones(sums.product.shape[1]))
+        correlation = tile_correlation(sums, np.ones(sums[0].shape[1]))
         length = estimate_length(sums, shears, min(crack.block))
         rows.append({"correlation": correlation, "structure_function": variance} | length._asdict())
     result = xr.Dataset(
@@ -150,7 +151,7 @@ def _whole_cell_shears(crack: Crack, directions: Sequence[Direction], most: int 
     return np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1, cells, most)))]) * step
 
 
-def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[TileSums, Array]:
+def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[Sums, Array]:
     layout = crack.layout
     order = 0 if any(layout.wraps) else 1
     faces = [crack.lower] if crack.upper is None else [crack.lower, crack.upper]
@@ -167,19 +168,11 @@ def _without_rounding(residual: Array, heights: Array) -> Array:
     return residual if float(np.nanmax(np.abs(residual))) > rounding_of(heights) else residual * 0.0
 
 
-@dataclass(frozen=True)
-class TileSums:
-    """Sums over every tile, shape (shear, tile): products of facing heights, and their squares."""
-
-    product: Array
-    lower: Array
-    upper: Array
-
-    def correlation(self, weights: Array) -> Array:
-        """Return the correlation at every shear from the tiles of weight 1 (the others have weight 0)."""
-        product, lower, upper = (part @ weights for part in (self.product, self.lower, self.upper))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(product / np.sqrt(lower * upper))
+def tile_correlation(sums: Sums, weights: Array) -> Array:
+    """Return the correlation at every shear from the tiles of weight 1 (the others have weight 0)."""
+    product, lower, upper = (part @ weights for part in sums)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(product / np.sqrt(lower * upper))
 
 
 class Length(NamedTuple):
@@ -191,7 +184,7 @@ class Length(NamedTuple):
     missing_reason: str = ""
 
 
-def tile_sums(lower: Array, upper: Array, block: Block, shears: Array, unit: Pair) -> tuple[TileSums, Array]:
+def tile_sums(lower: Array, upper: Array, block: Block, shears: Array, unit: Pair) -> tuple[Sums, Array]:
     """Return the sums over tiles, and the variance of the delta-surface, at every shear.
 
     Parameters
@@ -202,15 +195,13 @@ def tile_sums(lower: Array, upper: Array, block: Block, shears: Array, unit: Pai
         Heights of the face of the block from the mean plane of the upper face.
     """
     side = FINE if min(block.cells) >= FINE else 1
-    tiles = side * side
-    product, squares = np.empty((shears.size, tiles)), np.empty((shears.size, tiles))
-    variance = np.empty(shears.size)
+    shape = shears.size, side * side
+    product, squares, variance = np.empty(shape), np.empty(shape), np.empty(shears.size)
     for index, shear in enumerate(shears):
         under = heights_under(lower, block, block.shift(float(shear), unit))
         product[index], squares[index] = _tile_sum(under * upper, side), _tile_sum(under * under, side)
         variance[index] = np.var(under - upper)
-    upper_squares = np.broadcast_to(_tile_sum(upper * upper, side), (shears.size, tiles))
-    return TileSums(product, squares, upper_squares), variance
+    return (product, squares, np.broadcast_to(_tile_sum(upper * upper, side), shape)), variance
 
 
 def _tile_sum(values: Array, side: int) -> Array:
@@ -221,7 +212,7 @@ def _tile_sum(values: Array, side: int) -> Array:
 
 
 def estimate_length(
-    sums: TileSums,
+    sums: Sums,
     shears: Array,
     edge: float,
     # lengths in an edge: of 40 intervals on faces of exponential correlation 31 hold the length with 8, 34
@@ -234,8 +225,8 @@ def estimate_length(
     The interval is the jackknife spread of the logarithm of the length. The variances from 8 and from 4 tiles
     along an edge are extrapolated to fewer, wider tiles, which depend least on each other.
     """
-    tiles = sums.product.shape[1]
-    correlation = sums.correlation(np.ones(tiles))
+    tiles = sums[0].shape[1]
+    correlation = tile_correlation(sums, np.ones(tiles))
     value = _crossing(correlation, shears)
     if not np.isfinite(correlation[0]):
         return Length(math.nan, missing_reason="the faces are planes")
@@ -256,13 +247,12 @@ def estimate_length(
     return Length(value, value * math.exp(-half_width), value * math.exp(half_width))
 
 
-def _jackknife_variance(sums: TileSums, shears: Array, side: int) -> float:
+def _jackknife_variance(sums: Sums, shears: Array, side: int) -> float:
     """Return the jackknife variance of the logarithm of the length, with side * side tiles left out."""
     row = np.arange(FINE) * side // FINE
     group = (row[:, None] * side + row[None, :]).ravel()
-    lengths = [
-        _crossing(sums.correlation((group != tile).astype(float)), shears) for tile in range(side * side)
-    ]
+    correlations = (tile_correlation(sums, (group != tile).astype(float)) for tile in range(side * side))
+    lengths = [_crossing(correlation, shears) for correlation in correlations]
     with np.errstate(invalid="ignore"):
         return float((side * side - 1) * np.var(np.log(lengths)))
 

@@ -9,12 +9,11 @@ import re
 import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
 from fractalcontact.base.numbers import Array
@@ -115,15 +114,6 @@ class Request:
     def suffix(self) -> str:
         """The suffix of the format."""
         return file_suffix(self.path)
-
-
-@dataclass(frozen=True)
-class FileContent:
-    """A surface with metadata of its file: entries of the provenance, and whether it is a microscope's."""
-
-    surface: xr.DataArray
-    entries: dict[str, Any] = field(default_factory=dict)
-    is_microscope: bool = False
 
 
 class NotATable(ValueError):

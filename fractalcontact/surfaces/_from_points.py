@@ -122,38 +122,37 @@ def from_points(
     >>> bool(abs(surface).max() < 1e-12), round(float(surface.finest_scale), 3)
     (True, 0.012)
     """
+    surface = grid_points(points, spacing, triangles, units, plane, largest_gap)
+    given = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
+    return surface.assign_attrs(parameters=given)
+
+
+def grid_points(
+    points: Any, spacing: float | None, triangles: Any, units: str, plane: Any, largest_gap: float | None
+) -> xr.DataArray:
+    """Return valid points as heights, with entries of the provenance as attributes (see `from_points`)."""
     values, triangles = _fit_plane.finite_points(points, units), _triangles(points, triangles)
     frame, values = _in_plane(values, plane, None if spacing is None else float(spacing))
     cells = _cells_of(plane) if spacing is None else None
     step = spacing if cells is None else cells[-1].spacing
-    if (lattice := _lattice(values, step, cells)) is not None:
-        gridded = lattice
-    elif values.shape[1] == 2:
-        gridded = _profile(values, step, largest_gap, cells)
-    else:
+    surface = _lattice(values, step, cells)
+    if surface is None and values.shape[1] == 2:
+        surface = _profile(values, step, largest_gap, cells)
+    elif surface is None:
         given = None if triangles is None else _finite_triangles(_fit_plane.point_array(points), triangles)
-        gridded = _triangulated(values, step, given, largest_gap, cells)
-    facts = {"points": len(values), "missing_points": int(np.isnan(gridded.heights).sum()), **frame}
-    core = ("y", "x")[2 - gridded.heights.ndim :]
-    surface = xr.DataArray(
-        gridded.heights, dict(zip(core, gridded.centres, strict=True)), core, name="height"
-    )
-    if gridded.finest is not None:
-        surface = surface.assign_coords(finest_scale=gridded.finest)
-    parameters: dict[str, Any] = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
-    surface.attrs = {"parameters": parameters, "gridding": gridded.method, **facts, **gridded.facts}
-    return surface
+        surface = _triangulated(values, step, given, largest_gap, cells)
+    return surface.assign_attrs(points=len(values), **frame)
 
 
-@dataclass(frozen=True)
-class Gridded:
-    """Heights on a grid, centres of the cells (y, x), finest scale, and facts for the provenance."""
-
-    heights: Array
-    centres: tuple[Array, ...]
-    finest: float | None
-    method: str
-    facts: dict[str, Any]
+def _gridded(
+    heights: Array, centres: tuple[Array, ...], finest: float | None, method: str, facts: dict[str, Any]
+) -> xr.DataArray:
+    """Return heights by the centres of the cells (y, x), with facts of the gridding as attributes."""
+    core = ("y", "x")[2 - heights.ndim :]
+    coords: dict[str, Any] = dict(zip(core, centres, strict=True))
+    coords |= {} if finest is None else {"finest_scale": finest}
+    facts = {"gridding": method, "missing_points": int(np.isnan(heights).sum()), **facts}
+    return xr.DataArray(heights, coords, core, name="height", attrs=facts)
 
 
 def _in_plane(points: Array, plane: Any, spacing: float | None) -> tuple[dict[str, Any], Array]:
@@ -178,7 +177,7 @@ def _cells_of(plane: Any) -> tuple[_Axis, ...] | None:
     return axes if is_square else None
 
 
-def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | None) -> Gridded | None:
+def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | None) -> xr.DataArray | None:
     """Return heights of points that are on a uniform grid, that of `cells` if given; None if they are not."""
     axes = _regular_axes(points, spacing)
     if axes is None:
@@ -204,7 +203,7 @@ def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | No
         heights = (total / np.where(count > 0, count, np.nan)).reshape(shape)
     facts = {"repeated_nodes": int(np.count_nonzero(count > 1))}
     centres = tuple(axis.centres for axis in axes)
-    return Gridded(heights, centres, None, "none: the points are on a grid", facts)
+    return _gridded(heights, centres, None, "none: the points are on a grid", facts)
 
 
 @dataclass(frozen=True)
@@ -271,7 +270,7 @@ def _regular_axis(positions: Array, most: int) -> _Axis | None:
 
 def _profile(
     points: Array, spacing: float | None, largest_gap: float | None, cells: tuple[_Axis, ...] | None
-) -> Gridded:
+) -> xr.DataArray:
     """Return heights of a profile whose points are not uniform, interpolated linearly."""
     x, inverse, repeats = np.unique(points[:, 0], return_inverse=True, return_counts=True)
     z = np.bincount(inverse, weights=points[:, 1]) / repeats
@@ -287,7 +286,7 @@ def _profile(
     left = np.clip(np.searchsorted(x, centres, side="right") - 1, 0, x.size - 2)
     heights[~bridged[left]] = np.nan
     facts = {"point_distance": distance, "largest_gap": longest}
-    return Gridded(heights, (centres,), _finest(distance, step), "linear between the points", facts)
+    return _gridded(heights, (centres,), _finest(distance, step), "linear between the points", facts)
 
 
 def _finite_triangles(points: Any, triangles: Any) -> Array:
@@ -304,7 +303,7 @@ def _triangulated(
     given: Array | None,
     largest_gap: float | None,
     cells: tuple[_Axis, ...] | None,
-) -> Gridded:
+) -> xr.DataArray:
     """Return heights that are linear in triangles, NaN outside them."""
     origin = points[:, :2].min(axis=0)
     flat = points[:, :2] - origin
@@ -335,7 +334,7 @@ def _triangulated(
     if math.isfinite(gap):
         facts["largest_gap"] = gap
     method = "linear in the triangles of the " + ("Delaunay triangulation" if given is None else "mesh")
-    return Gridded(heights, (y, x), _finest(distance, step), method, facts)
+    return _gridded(heights, (y, x), _finest(distance, step), method, facts)
 
 
 def _delaunay(flat: Array) -> Array:

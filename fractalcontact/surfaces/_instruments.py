@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile, require_library
 from fractalcontact.base.files import NETCDF_LOCK
@@ -17,7 +18,7 @@ from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.surfaces import _files
-from fractalcontact.surfaces._files import FileContent, Request
+from fractalcontact.surfaces._files import Request
 from fractalcontact.surfaces._from_array import surface_array
 
 PROJECT = "project it to metres first, for example with `gdalwarp -t_srs EPSG:32632` or `pdal translate`"
@@ -32,7 +33,7 @@ PROFILERS = (b"X;Y;valid", b"Scan Parameters")  # heads of lists by profilers, H
 DATA_UNIT = re.compile(rb"^\W*data unit\s*[=:]\s*(\S+)", re.IGNORECASE | re.MULTILINE)
 
 
-def read_instrument(request: Request) -> FileContent:
+def read_instrument(request: Request) -> xr.DataArray:
     """Read one channel of an instrument's file; `.gz` is decompressed in memory.
 
     Raises
@@ -69,8 +70,7 @@ def read_instrument(request: Request) -> FileContent:
         "first_row": row,
     }
     metres = from_bottom(in_metres(heights, str(unit)), row)
-    surface = surface_array(metres, steps, (periodic,) * len(steps))
-    return FileContent(surface, entries, name not in PLAIN)
+    return surface_array(metres, steps, (periodic,) * len(steps)).assign_attrs(entries)
 
 
 def from_bottom(values: Array, first_row: str | None) -> Array:
@@ -189,7 +189,7 @@ def _steps(
     return tuple(edge / n for edge, n in zip(edges, points, strict=True))
 
 
-def read_raster(request: Request) -> FileContent:
+def read_raster(request: Request) -> xr.DataArray:
     """Read one band of a raster in projected coordinates."""
     path, channel, units, spacing = request.path, request.channel, request.units, request.spacing
     require_library(f"reading {path.name!r}", "rasterio", "geo")
@@ -227,7 +227,7 @@ def read_raster(request: Request) -> FileContent:
         "reader": f"rasterio {rasterio.__version__}",
         "first_row": "bottom",
     }
-    return FileContent(surface_array(_observed(heights), steps.tolist(), (False, False)), entries)
+    return surface_array(_observed(heights), steps.tolist(), (False, False)).assign_attrs(entries)
 
 
 def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:

@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,31 +24,17 @@ from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems, Words, reading
 from fractalcontact.surfaces import _files, _read_points
-from fractalcontact.surfaces._files import EmptyTable, FileContent, NotATable, Request, require_readable
+from fractalcontact.surfaces._files import EmptyTable, NotATable, Request, require_readable
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import axis_spacing, check_heights, check_spacing, labelled_heights
-from fractalcontact.surfaces._instruments import UNKNOWN, from_bottom, read_instrument, read_raster
+from fractalcontact.surfaces._instruments import PLAIN, UNKNOWN, from_bottom, read_instrument, read_raster
 from fractalcontact.surfaces._read_points import Points
 
-T = TypeVar("T")
 WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
 TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *_read_points.ALWAYS_POINTS)
 RASTERS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"ncols", b"NCOLS", b"DSAA", b"DSBB", b"DSRB")
 IMAGES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM")
-
-GRIDDING = (
-    "plane",
-    "rotation_matrix",
-    "centre",
-    "gridding",
-    "points",
-    "missing_points",
-    "repeated_nodes",
-    "point_distance",
-    "largest_gap",
-    "overhang_share",
-)  # entries of the provenance of `from_points`
 
 
 def _check(problems: Problems) -> None:
@@ -151,26 +137,25 @@ def read(
     """
     source = Path(path)
     with reading("", source):
-        content = file_content(Request(source, channel, units, spacing, first_row, columns, plane))
+        surface = file_content(Request(source, channel, units, spacing, first_row, columns, plane))
         digest = file_checksum(source)
-    stated = content.entries["stated_unit"]
+    stated = surface.attrs["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
         message = f"{source.name}: the file states {stated!r} and is read in {units!r}, the argument `units`"
         warn(message, ScaleWarning)
-    _warn_of_scale(content, source.name)
-    surface = content.surface
+    _warn_of_scale(surface, source.name)
     surface.attrs = {
         "title": f"Surface read from {source.name}",
         "parameters": {"path": source.name},
         "file_sha256": digest,
-        **content.entries,
+        **surface.attrs,
     }
-    if not str(content.entries.get("gridding", "none")).startswith("none"):
+    if not str(surface.attrs.get("gridding", "none")).startswith("none"):
         surface.attrs["achieved_error"] = "between the points nothing was measured: see finest_scale"
     return surface
 
 
-def file_content(request: Request) -> FileContent:
+def file_content(request: Request) -> xr.DataArray:
     """Read a file with the reader of its format."""
     path, suffix = request.path, request.suffix
     if suffix in NETCDF:
@@ -193,7 +178,7 @@ def file_content(request: Request) -> FileContent:
     return _text_content(request) if suffix in TABLES else read_instrument(request)
 
 
-def _text_content(request: Request) -> FileContent:
+def _text_content(request: Request) -> xr.DataArray:
     """Read text: a list of points, a table of heights, or the file of an instrument."""
     path = request.path
     try:
@@ -204,9 +189,9 @@ def _text_content(request: Request) -> FileContent:
             if request.spacing is None:
                 return _instrument_or_table(request)
             with contextlib.suppress(UnreadableFile, MissingExtra):
-                content = read_instrument(request)
-                if content.entries["stated_size"] is not None:  # any text has numbers to some reader
-                    return content
+                surface = read_instrument(request)
+                if surface.attrs["stated_size"] is not None:  # any text has numbers to some reader
+                    return surface
         fault = f"is not a table of numbers ({error})"
         raise UnreadableFile("", [f"path: {path.name!r} {fault}"]) from error
     if _read_points.is_list(table, path, request.columns):
@@ -226,7 +211,7 @@ def _text_content(request: Request) -> FileContent:
     return _heights_content(table.values, request)
 
 
-def _instrument_or_table(request: Request, *, is_table: bool = False) -> FileContent:
+def _instrument_or_table(request: Request, *, is_table: bool = False) -> xr.DataArray:
     """Read text that no spacing makes a table of heights as the file of an instrument."""
     try:
         return read_instrument(request)
@@ -237,18 +222,17 @@ def _instrument_or_table(request: Request, *, is_table: bool = False) -> FileCon
         raise UnreadableFile("", [f"spacing: expected {expected}, got None"]) from None
 
 
-def _gridded_points(points: Points, request: Request) -> FileContent:
+def _gridded_points(points: Points, request: Request) -> xr.DataArray:
     """Grid the points of a file."""
-    from fractalcontact.surfaces._from_points import from_points  # loads numba
+    from fractalcontact.surfaces._from_points import from_points, grid_points  # loads numba
 
     units, spacing, unit = request.units, request.spacing, request.units or points.unit or "m"
     require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
+    given = {"triangles": points.triangles, "units": unit, "plane": request.plane}
     with Problems("", UnreadableFile):  # its problems are those of the file
-        surface = from_points(
-            points.position, step, triangles=points.triangles, units=unit, plane=request.plane
-        )
-    gridding = {key: value for key, value in provenance_of(surface).items() if key in GRIDDING}
+        from_points.validate(points.position, step, **given)
+        surface = grid_points(points.position, step, **given, largest_gap=None)
     widest = max(float(np.ptp(surface[dim].values)) for dim in surface.dims)
     if units is None and points.unit is None and widest > 20.0:  # or it is a scan of a dam
         message = (
@@ -256,10 +240,10 @@ def _gridded_points(points: Points, request: Request) -> FileContent:
             "they are in millimetres, give units='mm'; else units='m'"
         )
         warn(message, ScaleWarning)
-    return FileContent(surface, {"stated_unit": points.unit, **points.entries, **gridding})
+    return surface.assign_attrs(points.entries, stated_unit=points.unit)
 
 
-def _archive_content(request: Request) -> FileContent:
+def _archive_content(request: Request) -> xr.DataArray:
     """Return an array of an npz file: the only one of heights, or that called `channel`.
 
     One-dimensional arrays called x and y are the coordinates, in the unit of the heights.
@@ -298,7 +282,7 @@ def _channel(names: Sequence[str], request: Request, kind: str) -> str:
     return str(name)
 
 
-def _array_content(values: Array, request: Request) -> FileContent:
+def _array_content(values: Array, request: Request) -> xr.DataArray:
     """Return an array of a numpy file: heights, or points in two or three columns."""
     has_points = values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind in "iuf"
     if has_points and len(values) >= _read_points.LEAST_POINTS:
@@ -306,7 +290,7 @@ def _array_content(values: Array, request: Request) -> FileContent:
     return _heights_content(values, request)
 
 
-def _heights_content(values: Array, request: Request) -> FileContent:
+def _heights_content(values: Array, request: Request) -> xr.DataArray:
     """Return an array of heights without coordinates as a surface."""
     spacing = request.spacing
     with Problems("", UnreadableFile) as problems:
@@ -317,10 +301,10 @@ def _heights_content(values: Array, request: Request) -> FileContent:
         if not problems.messages:
             check_spacing(problems, check_heights(problems, values), spacing)
     heights = labelled_heights(from_bottom(values, request.first_row), spacing, units=request.units or "m")
-    return FileContent(heights, {"stated_unit": None})
+    return heights.assign_attrs(stated_unit=None)
 
 
-def _netcdf_content(request: Request) -> FileContent:
+def _netcdf_content(request: Request) -> xr.DataArray:
     """Read `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x)."""
     spacing = request.spacing
     candidates = _height_variables(netcdf.open(request.path))
@@ -340,8 +324,10 @@ def _netcdf_content(request: Request) -> FileContent:
             array = array.assign_coords(plane_coords(sizes, steps, [False] * len(core), core))
         problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = stated if stated is None else str(stated)
-    array = array.drop_vars([coord for coord in array.coords if coord not in QUANTITIES]).rename("height")
-    return FileContent(array, {"stated_unit": stated, "before": provenance_of(candidates[name]) or None})
+    others = [coord for coord in array.coords if coord not in QUANTITIES]
+    surface: xr.DataArray = array.drop_vars(others).rename("height")
+    surface.attrs = {"stated_unit": stated, "before": provenance_of(candidates[name]) or None}
+    return surface
 
 
 def _height_variables(content: Any) -> dict[str, xr.DataArray]:
@@ -358,12 +344,12 @@ def _height_variables(content: Any) -> dict[str, xr.DataArray]:
     }
 
 
-def _warn_of_scale(content: FileContent, name: str) -> None:
+def _warn_of_scale(surface: xr.DataArray, name: str) -> None:
     """Warn where heights and extent do not fit each other, or a microscope's field is too wide."""
-    heights = content.surface.values
-    widest = max(read_grid(content.surface, core_dims(content.surface)).extent)
+    heights, widest = surface.values, max(read_grid(surface, core_dims(surface)).extent)
     faults = []
-    if content.is_microscope and widest > 1.0:
+    is_microscope = "channel" in surface.attrs and surface.attrs["format"] not in PLAIN
+    if is_microscope and widest > 1.0:
         faults.append(f"the field is {widest:g} m wide, more than any microscope has")
     observed = heights[np.isfinite(heights)]
     relief = float(observed.max() - observed.min()) / widest if observed.size else 0.0

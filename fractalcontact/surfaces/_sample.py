@@ -130,9 +130,8 @@ def _measured(name: str) -> xr.DataArray:
 
 
 def _concrete_crack() -> xr.DataArray:
-    content = file_content(Request(datasets_folder() / "concrete_crack.nc"))
-    surface = content.surface
-    surface.attrs = {"title": "Synthetic crack face of concrete", "before": content.entries["before"]}
+    surface = file_content(Request(datasets_folder() / "concrete_crack.nc"))
+    surface.attrs = {"title": "Synthetic crack face of concrete", "before": surface.attrs["before"]}
     return surface
 
 
