@@ -28,7 +28,6 @@ from fractalcontact.surfaces._files import EmptyTable, NotATable, Request, requi
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import axis_spacing, check_heights, check_spacing, labelled_heights
 from fractalcontact.surfaces._instruments import PLAIN, UNKNOWN, from_bottom, read_instrument, read_raster
-from fractalcontact.surfaces._read_points import Points
 
 WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
@@ -222,25 +221,25 @@ def _instrument_or_table(request: Request, *, is_table: bool = False) -> xr.Data
         raise UnreadableFile("", [f"spacing: expected {expected}, got None"]) from None
 
 
-def _gridded_points(points: Points, request: Request) -> xr.DataArray:
+def _gridded_points(points: xr.Dataset, request: Request) -> xr.DataArray:
     """Grid the points of a file."""
     from fractalcontact.surfaces._from_points import from_points, grid_points  # loads numba
 
-    units, spacing, unit = request.units, request.spacing, request.units or points.unit or "m"
+    units, spacing, stated = request.units, request.spacing, points.attrs["stated_unit"]
     require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
-    given = {"triangles": points.triangles, "units": unit, "plane": request.plane}
+    given = {"units": units or stated or "m", "plane": request.plane}
     with Problems("", UnreadableFile):  # its problems are those of the file
-        from_points.validate(points.position, step, **given)
-        surface = grid_points(points.position, step, **given, largest_gap=None)
+        from_points.validate(points, step, **given)
+        surface = grid_points(points, step, None, **given, largest_gap=None)
     widest = max(float(np.ptp(surface[dim].values)) for dim in surface.dims)
-    if units is None and points.unit is None and widest > 20.0:  # or it is a scan of a dam
+    if units is None and stated is None and widest > 20.0:  # or it is a scan of a dam
         message = (
             f"{request.path.name}: the points extend over {widest:.3g} m and the file states no unit: if "
             "they are in millimetres, give units='mm'; else units='m'"
         )
         warn(message, ScaleWarning)
-    return surface.assign_attrs(points.entries, stated_unit=points.unit)
+    return surface.assign_attrs(points.attrs)
 
 
 def _archive_content(request: Request) -> xr.DataArray:
@@ -286,7 +285,8 @@ def _array_content(values: Array, request: Request) -> xr.DataArray:
     """Return an array of a numpy file: heights, or points in two or three columns."""
     has_points = values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind in "iuf"
     if has_points and len(values) >= _read_points.LEAST_POINTS:
-        return _gridded_points(Points(values.astype(np.float64)), replace(request, plane=None))
+        points = _read_points.labelled_points(values.astype(np.float64), None, {})
+        return _gridded_points(points, replace(request, plane=None))
     return _heights_content(values, request)
 
 

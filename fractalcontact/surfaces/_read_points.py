@@ -7,7 +7,6 @@ import os
 import re
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
@@ -34,27 +33,6 @@ X = ("x", "points:0", "easting", "east", "e")
 Y = ("y", "points:1", "northing", "north", "n")
 Z = ("z", "points:2", "height", "elevation", "altitude", "h")
 DEGREES = ("lon", "long", "longitude", "lat", "latitude")
-
-
-@dataclass(frozen=True)
-class Points:
-    """Points of a file.
-
-    Attributes
-    ----------
-    position : ndarray, shape (n, 2) or (n, 3)
-        In the units of the file.
-    unit : str or None
-        As stated in the file.
-    triangles : ndarray of int, shape (m, 3), or None
-    entries : dict
-        For the provenance.
-    """
-
-    position: Array
-    unit: str | None = None
-    triangles: Array | None = None
-    entries: dict[str, Any] = field(default_factory=dict)
 
 
 def check_columns(problems: Problems) -> None:
@@ -134,17 +112,27 @@ def read_points(
     """
     source = Path(path)
     with reading("", source):
-        content, digest = point_content(source, columns), file_checksum(source)
-    unit = units or content.unit or "m"
-    axes = ["x", "y", "z"] if content.position.shape[1] == 3 else ["x", "z"]
-    variables: dict[str, Any] = {"position": (("point", "point_axis"), in_metres(content.position, unit))}
-    if content.triangles is not None:
-        variables["triangles"] = (("triangle", "corner"), content.triangles)
-    facts = {"parameters": {"path": source.name}, "file_sha256": digest, **content.entries}
-    return xr.Dataset(variables, {"point_axis": axes}, facts | {"stated_unit": content.unit})
+        points, digest = point_content(source, columns), file_checksum(source)
+    position = in_metres(points["position"], units or points.attrs["stated_unit"] or "m")
+    facts = {"parameters": {"path": source.name}, "file_sha256": digest, **points.attrs}
+    return points.assign(position=position).assign_attrs(facts)
 
 
-def point_content(path: Path, columns: Sequence[str | int] | None) -> Points:
+def labelled_points(
+    position: Array, unit: str | None, entries: dict[str, Any], triangles: Array | None = None
+) -> xr.Dataset:
+    """Return points, shape (n, 2) or (n, 3), in the unit of their file, with entries of the provenance.
+
+    The triangles, shape (m, 3), are those of a mesh.
+    """
+    axes = ["x", "y", "z"] if position.shape[1] == 3 else ["x", "z"]
+    points = xr.Dataset({"position": (("point", "point_axis"), position)}, {"point_axis": axes})
+    if triangles is not None and len(triangles):
+        points["triangles"] = ("triangle", "corner"), triangles
+    return points.assign_attrs(entries, stated_unit=unit)
+
+
+def point_content(path: Path, columns: Sequence[str | int] | None) -> xr.Dataset:
     """Read a file of points with the reader of its format."""
     suffix = _files.file_suffix(path)
     if suffix in MESHES:
@@ -170,7 +158,7 @@ def is_list(table: Table, path: Path, columns: Sequence[str | int] | None) -> bo
     )
 
 
-def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None) -> Points:
+def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None) -> xr.Dataset:
     """Return the points of a table."""
     chosen = _columns(table, path, columns)
     stated = {table.units[k] for k in chosen if table.units and table.units[k]}
@@ -191,7 +179,7 @@ def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None)
         entries["columns"] = [table.names[k] for k in chosen]
     if table.decimal_comma:
         entries["decimal_mark"] = ","
-    return Points(table.values[:, chosen], next(iter(stated), None), None, entries)
+    return labelled_points(table.values[:, chosen], next(iter(stated), None), entries)
 
 
 def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> list[int]:
@@ -226,7 +214,7 @@ def _place(names: list[str], group: Sequence[str]) -> int | None:
     return next((names.index(name) for name in group if name in names), None)
 
 
-def _mesh(path: Path, suffix: str) -> Points:
+def _mesh(path: Path, suffix: str) -> xr.Dataset:
     """Read a mesh, or a cloud of points in the format of a mesh."""
     require_library(f"reading {path.name!r}", "trimesh", "mesh")
     import trimesh
@@ -240,10 +228,10 @@ def _mesh(path: Path, suffix: str) -> Points:
         triangles = np.array(getattr(mesh, "faces", np.empty((0, 3))), dtype=np.int64).reshape(-1, 3)
     _files.require_readable(len(position) > 0, "path", f"points in {path.name!r}")
     entries = {"format": suffix.lstrip("."), "reader": f"trimesh {trimesh.__version__}"}
-    return Points(position, None, triangles if len(triangles) else None, entries)
+    return labelled_points(position, None, entries, triangles)
 
 
-def _las(path: Path) -> Points:
+def _las(path: Path) -> xr.Dataset:
     """Read a LAS or LAZ file; longitudes and latitudes are refused."""
     require_library(f"reading {path.name!r}", "laspy", "mesh")
     import laspy
@@ -261,7 +249,7 @@ def _las(path: Path) -> Points:
         problems.require(system != "foot", "path", "coordinates in metres; convert it first", "feet")
         problems.require(len(position) > 0, "path", f"points in {path.name!r}", "none")
     entries = {"format": path.suffix.lstrip("."), "reader": f"laspy {laspy.__version__}"}
-    return Points(position, "m" if system == "metre" else None, None, entries)
+    return labelled_points(position, "m" if system == "metre" else None, entries)
 
 
 def _check_las_size(file: IO[bytes], path: Path) -> None:
