@@ -161,14 +161,14 @@ def roughness_coefficient(
     rows, limits = [], np.full((2, len(directions)), np.nan)
     with Problems("") as problems:
         for i, towards in enumerate(directions):
-            lines = _profile_slopes(heights, grid.spacing, towards, interval)
-            fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / lines.lag)))
-            rows.append((_coefficient(fitted, lines.slope), lines.slope, lines.lag, fitted.interval))
+            slope, of_profiles, used = _profile_slopes(heights, grid.spacing, towards, interval)
+            fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / used)))
+            rows.append((_coefficient(fitted, slope), slope, used, fitted.interval))
             # JRC grows with Z2: the quantiles correspond. Below 20 profiles the low one is beyond all but one
-            if lines.of_profiles.size >= 20:
-                limits[:, i] = _coefficient(fitted, np.quantile(lines.of_profiles, (0.025, 0.975)))
+            if of_profiles.size >= 20:
+                limits[:, i] = _coefficient(fitted, np.quantile(of_profiles, (0.025, 0.975)))
             expected = f"heights {interval:g} m apart towards {towards.name}"
-            problems.require(math.isfinite(lines.slope), "surface", expected, NONE)
+            problems.require(math.isfinite(slope), "surface", expected, NONE)
     coefficient, slopes, lags, intervals = np.transpose(rows)
     position = (coefficient > LARGEST_JRC).astype(np.int8) - (coefficient < 0)
     limits[:, ~np.isfinite(limits).all(axis=0)] = np.nan
@@ -235,21 +235,13 @@ def _lag_cells(spacing: Sequence[float], towards: Direction, lag: float) -> list
     return cells
 
 
-class ProfileSlopes(NamedTuple):
-    """Rms slope of all profiles (NaN without any), of each profile, and the lag in use (m)."""
-
-    slope: float
-    of_profiles: Array
-    lag: float
-
-
 def _profile_slopes(
     heights: Array, spacing: Sequence[float], towards: Direction, lag: float
-) -> ProfileSlopes:
-    """Return the slopes between heights one lag apart.
+) -> tuple[float, Array, float]:
+    """Return the rms slope of all profiles (NaN without any), of each profile, and the lag in use (m).
 
-    The profiles are the lines of cells along the lag. Those with less than half of the readings of the
-    longest are left out of `of_profiles`: a short one scatters more.
+    Slopes are between heights one lag apart, and profiles the lines of cells along the lag. Those with less
+    than half of the readings of the longest are left out: a short one scatters more.
     """
     cells = _lag_cells(spacing, towards, lag)
     ahead = tuple(slice(max(n, 0), size + min(n, 0)) for n, size in zip(cells, heights.shape, strict=True))
@@ -258,13 +250,13 @@ def _profile_slopes(
     squares = (heights[ahead] - heights[behind]) ** 2
     observed = np.isfinite(squares)
     if not observed.any():
-        return ProfileSlopes(math.nan, np.empty(0), length)
+        return math.nan, np.empty(0), length
     line = _line_numbers(squares.shape, cells, spacing)[observed]
     squares = squares[observed]
     counts = np.bincount(line)
     long_enough = (counts > 0) & (2 * counts >= counts.max())
     means = np.bincount(line, weights=squares)[long_enough] / counts[long_enough]
-    return ProfileSlopes(math.sqrt(np.mean(squares)) / length, np.sqrt(means) / length, length)
+    return math.sqrt(np.mean(squares)) / length, np.sqrt(means) / length, length
 
 
 def _line_numbers(shape: Sequence[int], cells: Sequence[int], spacing: Sequence[float]) -> Array:
