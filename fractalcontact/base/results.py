@@ -13,6 +13,9 @@ The function returns plain variables and coordinates with names of `base.schema`
 entries of its provenance, except `title` and `references`, which replace those of the decorator,
 `parameters`, a dict that replaces recorded arguments (a default that depends on others, a path to
 shorten), and `completeness`, which stays an attribute: it lists what a stopped run left out.
+
+A problem that only the body finds is raised without the name of a function, by `base.validation.require` or
+as an `InvalidInput`; the decorator adds the name of the one that was called.
 """
 
 from __future__ import annotations
