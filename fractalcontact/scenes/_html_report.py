@@ -9,7 +9,7 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -130,22 +130,42 @@ def report(
 
 
 def write_report(
-    tree: xr.DataTree, target: Path, figures: Sequence[str | os.PathLike[str]], summary: Summary
+    tree: xr.DataTree,
+    target: Path,
+    figures: Sequence[str | os.PathLike[str]],
+    summary: Summary,
+    contents: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write the report with these figures and this summary."""
+    """Write the report with these figures, this summary and the `page_contents`, computed if not given."""
     with ThreadPoolExecutor(thread_count()) as pool:  # the encoder releases the interpreter lock
         pictures = pool.map(_picture_file, map(Path, figures))
-        text = _page(tree, pictures, summary, target)
+        text = _page(tree, pictures, summary, contents or page_contents(tree), target)
     target.parent.mkdir(parents=True, exist_ok=True)
     with written_whole(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return target
 
 
-def _page(tree: xr.DataTree, figures: Iterable[tuple[str, bytes]], summary: Summary, target: Path) -> str:
-    """Return the text of the page."""
-    overview, scene, single = group_of(tree, OVERVIEW), scene_of(tree), of_member(tree, 0)
+def page_contents(tree: xr.DataTree) -> dict[str, Any]:
+    """Return what the page shows beside the figures and the summary: the surface, the maps and the curves."""
+    single = of_member(tree, 0)
     frames = {name: frame for name, frame in tables(tree).items() if {*frame.columns} != {"run_time (s)"}}
+    return {
+        "surface": _surface(single),
+        "maps": list(_maps(single)),
+        "curves": [_curve_table(name, frame) for name, frame in frames.items()],
+    }
+
+
+def _page(
+    tree: xr.DataTree,
+    figures: Iterable[tuple[str, bytes]],
+    summary: Summary,
+    contents: Mapping[str, Any],
+    target: Path,
+) -> str:
+    """Return the text of the page."""
+    overview, scene = group_of(tree, OVERVIEW), scene_of(tree)
     scans = [] if overview is None else map(str, overview[SCAN].values)
     pages = {name: page for name in scans if (target.parent / (page := page_of(name))).is_file()}
     written = str(tree.attrs.get("history", "")).split(" ")[0]
@@ -165,9 +185,7 @@ def _page(tree: xr.DataTree, figures: Iterable[tuple[str, bytes]], summary: Summ
         scene=_as_json(scene) if scene else "",
         provenance=_as_json(provenance_of(tree)),
         references=str(tree.attrs.get("references", "")),
-        surface=_surface(single),
-        maps=list(_maps(single)),
-        curves=[_curve_table(name, frame) for name, frame in frames.items()],
+        **contents,
     )
 
 
