@@ -383,8 +383,13 @@ def _picture_file(path: Path) -> tuple[str, bytes]:
     return path.stem, content.getvalue()
 
 
-def _curve_table(name: str, frame: Any, most: int = 100) -> dict[str, Any]:
-    """Return the first rows of a table as text, at most `most`, and all of it as CSV."""
+def _curve_table(
+    name: str,
+    frame: Any,
+    most: int = 100,
+    largest: int = 1 << 19,  # bytes: 51 000 islands of 24 scans have 4 MB
+) -> dict[str, Any]:
+    """Return the first rows of a table as text, at most `most`, and all of it as CSV unless that is large."""
     shown = frame[[column for column in frame.columns if column.split(" (")[0] not in HIDDEN]].head(most)
     heads, columns = zip(*(_column(head, shown[head]) for head in shown.columns), strict=True)
     csv = frame.to_csv(index=False, float_format="%.9g").encode()
@@ -394,7 +399,7 @@ def _curve_table(name: str, frame: Any, most: int = 100) -> dict[str, Any]:
         "left_out": len(frame) - len(shown),
         "heads": heads,
         "rows": list(zip(*columns, strict=True)),
-        "csv": base64.b64encode(csv).decode(),
+        "csv": base64.b64encode(csv).decode() if len(csv) <= largest else "",
     }
 
 

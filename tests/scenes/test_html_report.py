@@ -167,6 +167,20 @@ def test_csv_links_hold_the_curves(study, page):
     np.testing.assert_allclose(csv["interface_closure (m)"], expected, rtol=1e-8)
 
 
+def test_a_table_of_many_rows_is_not_in_the_page(tmp_path):
+    height = fc.surfaces.fbm((8, 8), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
+    sizes = {count: {} for count in (1_000, 60_000)}
+    for count, page in sizes.items():
+        tree = surface_tree(height)
+        areas = xr.DataArray(np.linspace(0.1, 0.9, count), dims="island", attrs={"units": "m2"})
+        tree["domains/islands"] = xr.DataTree(xr.Dataset({"island_area": areas}))
+        text = fc.scenes.report(tree, tmp_path / f"{count}.html", figures=[]).read_text(encoding="utf-8")
+        page |= {"links": text.count("domains_islands_by_island.csv</a>"), "bytes": len(text)}
+        assert ("fractalcontact report result.nc --csv tables" in text) == (count == 60_000)
+    assert [page["links"] for page in sizes.values()] == [1, 0]
+    assert max(page["bytes"] for page in sizes.values()) < 200_000
+
+
 def test_text_of_the_study_cannot_become_markup(tmp_path):
     height = fc.surfaces.fbm((8, 8), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1)
     hostile = "</script><script>document.title = 'taken over'</script>"
