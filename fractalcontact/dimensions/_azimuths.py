@@ -466,12 +466,12 @@ def fit_azimuths(
         bins, found, spectrum, covariance = most_probable(classes, spectrum)
         moved = math.hypot(*(spectrum.log_ratio - classes.spectrum.log_ratio))
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
-        distance = max(moved / _SAME, float(np.ptp(change)) / 0.7)
-        if distance < nearest:
-            nearest, result = distance, (classes, bins, found, spectrum, covariance)
-        if distance < 1.0:
+        has_settled = moved < _SAME and np.ptp(change) < 0.7
+        if has_settled or moved < nearest:
+            nearest, result = moved, (classes, bins, found, spectrum, covariance)
+        if has_settled:
             break
-    # if none settles, as of white noise, the one that ends nearest to its start
+    # if none settles, as of white noise, the one whose metric ends nearest to its start
     classes, bins, found, spectrum, covariance = result
     isotropic, uv = replace(spectrum, log_ratio=np.zeros(2)), spectrum.log_ratio
     p_values = classes.test(isotropic, is_fitted=False), classes.test(spectrum, is_fitted=True)
