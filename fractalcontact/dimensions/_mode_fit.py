@@ -109,10 +109,10 @@ class FirstFit:
                 information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
             power = modes if is_complete else modes / correction
             keep &= power > EMPTY * pilot
-            if not keep.any():
-                return None
-            ratio = whitened(lattice, power, pilot, keep)
+            ratio = whitened(lattice, power, pilot, keep) if keep.any() else power
             keep &= ~single_waves(lattice, ratio, keep)
+            if not keep.any():  # of a narrow band single waves may be all
+                return None
             levels = levels_by_azimuth(lattice, ratio, keep)
             level = lay(lattice, levels)
             if is_settled:
