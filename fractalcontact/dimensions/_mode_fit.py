@@ -109,13 +109,13 @@ class FirstFit:
                 information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
             power = modes if is_complete else modes / correction
             keep &= power > EMPTY * pilot
-            ratio = whitened(lattice, power, pilot, keep) if keep.any() else power
-            keep &= ~single_waves(lattice, ratio, keep)
-            if not keep.any():  # of a narrow band single waves may be all
+            if not keep.any():
                 return None
+            ratio = whitened(lattice, power, pilot, keep)
+            keep &= ~single_waves(lattice, ratio, keep)
             levels = levels_by_azimuth(lattice, ratio, keep)
             level = lay(lattice, levels)
-            if is_settled:
+            if is_settled or not keep.any():  # of a narrow band single waves may be all
                 break
             now = np.array([math.log(lattice.stretch), 0.0])
             uv, _, share = log_ratio(levels, now, levels.slope(unblurred))
