@@ -165,7 +165,9 @@ def _short(value: Any) -> str:
 def _phrases(facts: dict[str, Any]) -> Iterable[str]:
     for key, value in facts.items():
         word = key.replace("_", " ")
-        if isinstance(value, bool):
+        if isinstance(value, list):
+            yield f"{word} " + " ".join("-" if v is None or v != v else f"{v:.4f}" for v in value)
+        elif isinstance(value, bool):
             yield word if value else f"not {word}"
         elif key == "error":
             yield str(value)

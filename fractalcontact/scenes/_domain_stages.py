@@ -15,10 +15,14 @@ from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, stage_type
 def _window(state: xr.Dataset) -> str | None:
     """Return the lengths over which the dimension was fitted; those over others are not comparable."""
     names = ("window_low", "window_high") if "window_low" in state else ("scale_min", "scale_max")
-    if not finite(state[names[0]]).size:
+    if not set(names) <= set(state.variables) or not finite(state[names[0]]).size:
         return None
     low, high = (finite(state[name]) for name in names)
-    return f"{length(low.min())} to {length(high.max())}".replace(" ", "\N{NO-BREAK SPACE}")
+    if state[names[0]].attrs.get("units") == "m":
+        text = f"{length(low.min())} to {length(high.max())}"
+    else:
+        text = f"{low.min():g} to {high.max():g} cells"
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _beside_random(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -37,7 +41,9 @@ def _beside_null(name: str, null: str) -> Any:
     Over several box sizes both are those of the middle one.
     """
 
-    def write(state: xr.Dataset) -> str:
+    def write(state: xr.Dataset) -> str | None:
+        if name not in state:
+            return None
         state = state.isel(box_size=state.sizes.get("box_size", 0) // 2, missing_dims="ignore")
         return plain(state[name], 2) + (f" ({plain(state[null], 2)})" if null in state else "")
 
@@ -50,14 +56,18 @@ def _middle_box(state: xr.Dataset) -> str | None:
     return length(float(state["box_length"][state.sizes["box_size"] // 2]))
 
 
-def _crosses(state: xr.Dataset) -> str:
+def _crosses(state: xr.Dataset) -> str | None:
     """Return the axes along which the set of contacts crosses the body."""
+    if "percolates" not in state or "axis" not in state.coords:
+        return None
     axes = [str(axis) for axis in state["axis"].values if bool(state["percolates"].sel(axis=axis).all())]
     return f"along {' and '.join(axes)}" if axes else "no"
 
 
-def _window_dimension(state: xr.Dataset) -> str:
+def _window_dimension(state: xr.Dataset) -> str | None:
     """Return the dimension over the window and that of random spots, or why there is none."""
+    if "domain_dimension" not in state:
+        return None
     if finite(state["domain_dimension"]).size:
         return f"{plain(state['domain_dimension'], 2)} ({plain(state['spots_dimension'], 2)})"
     flag = state["signature_flag"]

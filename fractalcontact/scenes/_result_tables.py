@@ -164,7 +164,11 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
 def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
     """Return the value of a dim that names a row: a length in the unit of its column, a load, or a word."""
     if dim == "step":
+        if rows.load not in state.variables:
+            return str(int(state["step"])) if "step" in state.coords else ""
         return amount(state[rows.load], scale=column_scale(data[rows.load]))
+    if dim not in state.coords:
+        return ""
     value = state[dim]
     if value.dtype.kind not in "fiu":
         return str(value.values)

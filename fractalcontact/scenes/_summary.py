@@ -472,6 +472,8 @@ def _true_pressure(tree: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterato
 @_of_contacts
 def _slopes(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
     """Yield that slopes are beyond small strains."""
+    if "rms_slope" not in pressed:
+        return
     slope = float(pressed["rms_slope"].max())
     if slope > STEEP:
         yield (

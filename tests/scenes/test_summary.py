@@ -328,6 +328,21 @@ def test_analysis_of_the_contact_set_is_on_the_screen(tmp_path):
     assert rows(tree, "islands")[-1]["islands"] == str(count)
 
 
+@pytest.mark.parametrize("along", ["step", "shear"])
+@pytest.mark.parametrize("in_metres", [False, True])
+def test_sets_without_loads_have_rows_and_windows_in_their_own_unit(along, in_metres):
+    """Masks of a user have neither loads nor shears, and some no lengths."""
+    places = (np.arange(64) + 0.5) * 1e-4
+    coords = {"y": places, "x": places} if in_metres else {}
+    cells = np.random.default_rng(1).random((2, 64, 64)) < 0.3
+    mask = xr.DataArray(cells, coords, (along, "y", "x"))
+    names = "box_dimension", "percolation", "describe", "islands", "evolution", "signature"
+    groups = {f"/domains/{name}": getattr(fc.domains, name)(mask) for name in names}
+    text = fc.scenes.summary(xr.DataTree.from_dict(groups)).replace("\N{NO-BREAK SPACE}", " ")
+    assert ("100 µm to 0.8 mm" in text) == in_metres
+    assert ("1 to 8 cells" in text) == (not in_metres)
+
+
 def test_slope_of_a_level_face_is_left_out():
     """A mean slope that rounds to zero is no result."""
     dilatancy = fc.joints.dilatancy(
