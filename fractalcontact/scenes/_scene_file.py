@@ -88,16 +88,26 @@ def parse(path: str | os.PathLike[str]) -> tuple[Scene, Problems]:
     return check_tables(Scene(source.stem, tables, source.resolve().parent))
 
 
+def _is_too_deep(value: Any, levels: int = 8) -> bool:
+    """Return whether tables and lists are nested deeper than any scene needs, which has four levels."""
+    level = [value]
+    for _ in range(levels):
+        inner = [item.values() if isinstance(item, dict) else item for item in level]
+        level = [item for items in inner for item in items if isinstance(item, (dict, list))]
+        if not level:
+            return False
+    return True
+
+
 def check_tables(scene: Scene) -> tuple[Scene, Problems]:
     """Return a scene with its ranges expanded, and the problems of its tables.
 
     In place of what is no table it has an empty one, so that the problems of the others are listed too.
     """
     problems = Problems(f"scene {scene.name}")
-    try:
-        tables = {key: _in_plain_words(value, key, key, problems) for key, value in scene.tables.items()}
-    except RecursionError:
-        raise InvalidInput(problems.where, [TOO_DEEP]) from None
+    if _is_too_deep(scene.tables):
+        raise InvalidInput(problems.where, [TOO_DEEP])
+    tables = {key: _in_plain_words(value, key, key, problems) for key, value in scene.tables.items()}
     for key, name in (("lower", "surface"), ("upper", "upper")):  # files of both faces, in one table
         if isinstance(tables.get("joint"), dict) and key in tables["joint"]:
             own = tables.get(name)
