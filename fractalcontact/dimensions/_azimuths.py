@@ -467,7 +467,7 @@ def fit_azimuths(
         moved = math.hypot(*(spectrum.log_ratio - classes.spectrum.log_ratio))
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
         has_settled = moved < _SAME and np.ptp(change) < 0.7
-        if has_settled or not moved >= nearest:
+        if has_settled or not moved >= nearest:  # the first one in any case
             nearest, result = moved, (classes, bins, found, spectrum, covariance)
         if has_settled:
             break

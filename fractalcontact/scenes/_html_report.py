@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ FLAG_COLOURS = {
     "stick": "#0b5394",
     "slip": "#e69f00",
 }
-OTHER_COLOUR = "#009e73"
+OTHER_COLOURS = ("#009e73", "#cc79a7", "#56b4e9", "#f0e442")
 LOADS = {"normal_force": "F", "nominal_pressure": "p", "closure": "w", "tangential_force": "Q"}
 PLAIN_LIST = re.compile(r"\[[^\[\]{}\"]*\]")  # in JSON: of numbers, without words, lists or objects
 HIDDEN = ("run_time", "iterations", "stop_reason")  # from the tables on the page
@@ -245,10 +246,8 @@ def _map_set(tree: xr.DataTree, path: str, dataset: xr.Dataset, name: str, most:
     shown = {dim: spread_indices(state.sizes[dim], limit) for dim in dims}
     dataset = dataset.isel(shown)
     state = dataset[name]
-    key = {
-        meaning: FLAG_COLOURS.get(meaning, OTHER_COLOUR)
-        for meaning in str(state.attrs["flag_meanings"]).split()
-    }
+    meanings, spare = str(state.attrs["flag_meanings"]).split(), cycle(OTHER_COLOURS)
+    key = {meaning: FLAG_COLOURS.get(meaning) or next(spare) for meaning in meanings}
     block = math.ceil(max(state.shape[-2:]) / 400)  # the page shows a map 512 pixels wide
     palette = list(key.values())
     pictures, alternatives = [], []
