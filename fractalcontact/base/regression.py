@@ -53,7 +53,7 @@ def rounding_of(heights: Array) -> float:
     return float(ROUNDING * np.nanmax(np.abs(heights)))
 
 
-def detrended(heights: Array, order: int) -> tuple[Array, bool]:
+def detrended(heights: Array, order: int, wraps: Sequence[bool] = ()) -> tuple[Array, bool]:
     """Return the heights minus their least-squares polynomial, and whether the points determine it.
 
     Parameters
@@ -62,13 +62,15 @@ def detrended(heights: Array, order: int) -> tuple[Array, bool]:
         NaN where missing; at least one value is finite.
     order : int
         Total degree of the polynomial.
+    wraps : sequence of bool
+        Axes along which the heights are periodic: they come back to their height, and have no slope.
     """
     values, _, scale = shifted(heights)
     observed = np.isfinite(values)
     is_complete = bool(observed.all())
     if not is_complete:
         values[~observed] = 0.0
-    basis = _basis(heights.shape, order)
+    basis = _basis(heights.shape, order, wraps)
     gram = _gram(basis, observed)
     singular = np.linalg.svd(gram, compute_uv=False)
     if singular[-1] < RANK * singular[0]:
@@ -84,34 +86,43 @@ def detrended(heights: Array, order: int) -> tuple[Array, bool]:
     return values, True
 
 
-def slopes(heights: Array, spacing: Sequence[float]) -> tuple[float, ...]:
-    """Return the slope of the mean plane along each axis, y first; NaN if it is undetermined."""
+def slopes(heights: Array, spacing: Sequence[float], wraps: Sequence[bool] = ()) -> tuple[float, ...]:
+    """Return the slope of the mean plane along each axis, y first; NaN if it is undetermined.
+
+    It is 0 along an axis that wraps.
+    """
     if not np.isfinite(heights).any():
         return (math.nan,) * heights.ndim
     values, _, scale = shifted(heights)
-    return tuple(scale * slope for slope in scaled_slopes(values, spacing))
+    return tuple(scale * slope for slope in scaled_slopes(values, spacing, wraps))
 
 
-def scaled_slopes(values: Array, spacing: Sequence[float]) -> tuple[float, ...]:
+def scaled_slopes(values: Array, spacing: Sequence[float], wraps: Sequence[bool] = ()) -> tuple[float, ...]:
     """Return the slopes of heights that `shifted` has scaled; they are not changed."""
     observed = np.isfinite(values)
     if not observed.all():
         values = np.where(observed, values, 0.0)
-    basis = _basis(values.shape, 1)
+    basis = _basis(values.shape, 1, wraps)
     gram = _gram(basis, observed)
     singular = np.linalg.svd(gram, compute_uv=False)
     if singular[-1] < RANK * singular[0]:
         return (math.nan,) * values.ndim
     weights = np.linalg.solve(gram, np.array([_project(values, functions) for functions in basis]))
-    # the basis is 1, then each axis in half-extents, x before y
+    # the basis is 1, then each axis that does not wrap in half-extents, x before y
+    rises = iter(weights[:0:-1])
     halves = [0.5 * (n - 1) * step for n, step in zip(values.shape, spacing, strict=True)]
-    return tuple(float(w) / half for w, half in zip(weights[:0:-1], halves, strict=True))
+    wraps = wraps or (False,) * values.ndim
+    return tuple(0.0 if w else float(next(rises)) / half for w, half in zip(wraps, halves, strict=True))
 
 
-def _basis(shape: tuple[int, ...], order: int) -> list[tuple[Array, ...]]:
-    """Return products of Legendre polynomials on -1 ... 1 for each axis, ordered by degree, then y power."""
+def _basis(shape: tuple[int, ...], order: int, wraps: Sequence[bool]) -> list[tuple[Array, ...]]:
+    """Return products of Legendre polynomials on -1 ... 1 for each axis, ordered by degree, then y power.
+
+    They are even along an axis that wraps.
+    """
     axes = [np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, n), order).T for n in shape]
-    powers = itertools.product(range(order + 1), repeat=len(shape))
+    highest = [0 if w else order for w in wraps or (False,) * len(shape)]
+    powers = itertools.product(*(range(power + 1) for power in highest))
     chosen = sorted((p for p in powers if sum(p) <= order), key=lambda p: (sum(p), p))
     return [tuple(axis[power] for axis, power in zip(axes, p, strict=True)) for p in chosen]
 

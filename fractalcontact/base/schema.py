@@ -303,6 +303,7 @@ QUANTITIES: dict[str, Quantity] = {
     "friction_factor": Quantity("1", "factor of the friction coefficient"),
     "fracture_energy_factor": Quantity("1", "factor of the fracture energy"),
     "scale_position": Quantity("1", "position of JRC on the scale of standard profiles", _SCALE_POSITION),
+    "lag_azimuth": Quantity("degree", "azimuth of the lag in whole cells, from x towards y"),
     "regression_interval": Quantity("m", "sampling interval to which the regression was fitted"),
     "area_fraction": Quantity("1", "share of the area that faces the shear"),
     "theta_max": Quantity("degree", "greatest apparent dip towards the shear"),

@@ -103,9 +103,10 @@ def higuchi(surface: xr.DataArray) -> xr.Dataset:
     Returns
     -------
     Dataset over `lag` (m)
-        `higuchi_length` (m): the mean absolute increment over a lag of k points, times (n - 1) / k^2;
-        `pair_count` (of increments); and `local_slope`, which is -D, D the dimension of the profile. Lags
-        grow by about sqrt 2 from one spacing to a quarter of the profile.
+        `higuchi_length` (m): the mean absolute increment over a lag of k points, times (n - 1) / k^2, with n
+        of the shorter edge and k in points of the coarser axis; `pair_count` (of increments); and
+        `local_slope`, which is -D, D the dimension of the profile. Lags grow by about sqrt 2 from one spacing
+        to a quarter of the profile.
 
     Raises
     ------

@@ -153,10 +153,9 @@ def _whole_cell_shears(crack: Crack, directions: Sequence[Direction], most: int 
 
 def _crack_sums(crack: Crack, shears: Array, towards: Direction) -> tuple[Sums, Array]:
     layout = crack.layout
-    order = 0 if any(layout.wraps) else 1
     faces = [crack.lower] if crack.upper is None else [crack.lower, crack.upper]
     heights = [np.asarray(face.values, dtype=np.float64) for face in faces]
-    residuals = [_without_rounding(detrended(face, order)[0], face) for face in heights]
+    residuals = [_without_rounding(detrended(face, 1, layout.wraps)[0], face) for face in heights]
     sums, variance = tile_sums(residuals[0], residuals[-1][layout.slices], layout, shears, towards.unit)
     if not np.isfinite(variance).all():
         raise missing_heights(crack, towards, float(shears[~np.isfinite(variance)][0]))

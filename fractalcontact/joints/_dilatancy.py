@@ -146,7 +146,7 @@ def dilatancy(
 
 def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction]) -> xr.Dataset:
     lifted, initial = rigid_dilatancies(crack, shears, directions)
-    slope_y, slope_x = mean_slopes(crack.faces()[0], crack.layout)
+    slope_y, slope_x = slopes(crack.faces()[0], crack.layout.spacing, crack.layout.wraps)
     mean_slope = np.array([slope_y * towards.unit[0] + slope_x * towards.unit[1] for towards in directions])
     dims = ("direction", "shear")
     return xr.Dataset(
@@ -200,9 +200,3 @@ def separations(lower: Array, upper: Array, block: Block, shears: Array, unit: P
         under = heights_under(lower, block, block.shift(float(shear), unit))
         highest[index] = np.subtract(under, upper, out=difference).max()
     return highest
-
-
-def mean_slopes(face: Array, block: Block) -> Pair:
-    """Return the slopes (y, x) of the mean plane of a face without its gaps; zero where an axis wraps."""
-    slope_y, slope_x = slopes(face, block.spacing)
-    return 0.0 if block.wraps[0] else slope_y, 0.0 if block.wraps[1] else slope_x

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import Direction, check_directions, direction_coords, read_directions
-from fractalcontact.base.grid import DECADES, core_dims, read_grid
+from fractalcontact.base.grid import DECADES, Grid, core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import ROUNDING, detrended, rounding_of, slopes
 from fractalcontact.base.results import public_result
@@ -95,8 +95,9 @@ def roughness_coefficient(
     """Return the joint roughness coefficient JRC of a surface or profile from the slope Z2 of its profiles.
 
     Z2 is the root mean square slope along a direction between readings one lag apart, after removal of the
-    mean plane (of a profile: the mean line). On a fractal surface Z2 grows as the lag decreases. A regression
-    is therefore only valid at the sampling interval to which it was fitted, which is the default lag.
+    mean plane (of a profile: the mean line), which has no slope along a periodic axis. On a fractal surface
+    Z2 grows as the lag decreases. A regression is therefore only valid at the sampling interval to which it
+    was fitted, which is the default lag.
 
     Parameters
     ----------
@@ -109,8 +110,8 @@ def roughness_coefficient(
         Regression of JRC over Z2, with the sampling intervals to which it was fitted: 0.508 mm; 0.25, 0.5
         and 1 mm; 0.5 and 1 mm. The one whose interval is nearest to the lag in use is taken.
     lag : float, optional
-        Interval between the readings, m; it is rounded to whole cells (y, x), at least one. Default: 0.508 mm
-        for "tse_cruden", otherwise 0.5 mm.
+        Interval between the readings, m; it is rounded to whole cells (y, x), at least one, which turns it
+        where these are few. Default: 0.508 mm for "tse_cruden", otherwise 0.5 mm.
     length : float, optional
         Length of a joint, m, at least 0.1, to which the coefficient is scaled as well.
 
@@ -119,8 +120,8 @@ def roughness_coefficient(
     Dataset over direction
         roughness_coefficient, the JRC of `strength_envelope`; a value outside 0 to 20 is an
         extrapolation, which scale_position reports. roughness_coefficient_low and _high, between which 95 %
-        of the single profiles of the surface lie. profile_slope Z2, lag (m) in use, regression_interval (m).
-        With `length` scaled_roughness_coefficient.
+        of the single profiles of the surface lie. profile_slope Z2; lag (m) and lag_azimuth (degree) in
+        use, of whole cells; regression_interval (m). With `length` scaled_roughness_coefficient.
 
     Raises
     ------
@@ -157,19 +158,22 @@ def roughness_coefficient(
     chosen_direction = _direction_or_default(direction, surface)
     directions = read_directions(chosen_direction)
     interval = _lag_or_default(lag, regression)
-    heights = detrended(np.asarray(surface.values, dtype=np.float64), 1)[0]
+    heights = detrended(np.asarray(surface.values, dtype=np.float64), 1, grid.periodic)[0]
     rows, limits = [], np.full((2, len(directions)), np.nan)
     with Problems("") as problems:
         for i, towards in enumerate(directions):
-            slope, of_profiles, used = _profile_slopes(heights, grid.spacing, towards, interval)
+            cells = _lag_cells(grid.spacing, towards, interval)
+            y, x = [0.0, *np.multiply(cells, grid.spacing)][-2:]
+            used, azimuth = math.hypot(y, x), math.degrees(math.atan2(y, x)) % 360.0
+            slope, of_profiles = _profile_slopes(heights, grid, cells)
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / used)))
-            rows.append((_coefficient(fitted, slope), slope, used, fitted.interval))
+            rows.append((_coefficient(fitted, slope), slope, used, azimuth, fitted.interval))
             # JRC grows with Z2: the quantiles correspond. Below 20 profiles the low one is beyond all but one
             if of_profiles.size >= 20:
                 limits[:, i] = _coefficient(fitted, np.quantile(of_profiles, (0.025, 0.975)))
             expected = f"heights {interval:g} m apart towards {towards.name}"
             problems.require(math.isfinite(slope), "surface", expected, NONE)
-    coefficient, slopes, lags, intervals = np.transpose(rows)
+    coefficient, slopes, lags, azimuths, intervals = np.transpose(rows)
     position = (coefficient > LARGEST_JRC).astype(np.int8) - (coefficient < 0)
     limits[:, ~np.isfinite(limits).all(axis=0)] = np.nan
     variables = {
@@ -179,6 +183,7 @@ def roughness_coefficient(
         "scale_position": position,  # -1 below, 1 above
         "profile_slope": slopes,
         "lag": lags,
+        "lag_azimuth": azimuths,
         "regression_interval": intervals,
     }
     if length is not None:
@@ -210,10 +215,11 @@ def _coefficient(law: Regression, slope: Any) -> Any:
         return law.offset + law.factor * (np.log10(slope) if law.power is None else slope**law.power)
 
 
-def _add_notes(result: xr.Dataset, tolerance: float = 0.1) -> None:
-    """Say which values are extrapolated, and where the lag is not that of the regression.
+def _add_notes(result: xr.Dataset, tolerance: float = 0.1, largest_turn: float = 5.0) -> None:
+    """Say which values are extrapolated, and where the lag is not that of the regression or the direction.
 
-    At H = 0.7 a lag that is off by the tolerance changes the result by 0.4.
+    At H = 0.7 a lag that is off by the tolerance changes the result by 0.4. At 30 degrees to straight ridges
+    5 degrees change Z2 by 15 %.
     """
     comments = []
     if result["scale_position"].any():
@@ -221,6 +227,9 @@ def _add_notes(result: xr.Dataset, tolerance: float = 0.1) -> None:
     off = np.abs(result["lag"].values / result["regression_interval"].values - 1.0) > tolerance
     if off.any():
         comments.append("the lag in use is not the sampling interval of the regression")
+    turned = (result["lag_azimuth"].values - result["azimuth"].values + 180.0) % 360.0 - 180.0
+    if (np.abs(turned) > largest_turn).any():
+        comments.append("the lag in use, of whole cells, has another azimuth: see lag_azimuth")
     if comments:
         result["roughness_coefficient"].attrs["comment"] = "; ".join(comments)
 
@@ -235,28 +244,27 @@ def _lag_cells(spacing: Sequence[float], towards: Direction, lag: float) -> list
     return cells
 
 
-def _profile_slopes(
-    heights: Array, spacing: Sequence[float], towards: Direction, lag: float
-) -> tuple[float, Array, float]:
-    """Return the rms slope of all profiles (NaN without any), of each profile, and the lag in use (m).
+def _profile_slopes(heights: Array, grid: Grid, cells: Sequence[int]) -> tuple[float, Array]:
+    """Return the rms slope of all profiles (NaN without any), and of each profile.
 
-    Slopes are between heights one lag apart, and profiles the lines of cells along the lag. Those with less
-    than half of the readings of the longest are left out: a short one scatters more.
+    Slopes are between heights a lag of some cells apart, and profiles the lines of cells along it. Those with
+    less than half of the readings of the longest are left out: a short one scatters more.
     """
-    cells = _lag_cells(spacing, towards, lag)
+    axes = list(zip(cells, grid.periodic, strict=True))
+    heights = np.pad(heights, [(max(-n, 0), max(n, 0)) if w else (0, 0) for n, w in axes], mode="wrap")
     ahead = tuple(slice(max(n, 0), size + min(n, 0)) for n, size in zip(cells, heights.shape, strict=True))
     behind = tuple(slice(max(-n, 0), size + min(-n, 0)) for n, size in zip(cells, heights.shape, strict=True))
-    length = math.hypot(*(n * step for n, step in zip(cells, spacing, strict=True)))
+    length = math.hypot(*np.multiply(cells, grid.spacing))
     squares = (heights[ahead] - heights[behind]) ** 2
     observed = np.isfinite(squares)
     if not observed.any():
-        return math.nan, np.empty(0), length
-    line = _line_numbers(squares.shape, cells, spacing)[observed]
+        return math.nan, np.empty(0)
+    line = _line_numbers(squares.shape, cells, grid.spacing)[observed]
     squares = squares[observed]
     counts = np.bincount(line)
     long_enough = (counts > 0) & (2 * counts >= counts.max())
     means = np.bincount(line, weights=squares)[long_enough] / counts[long_enough]
-    return math.sqrt(np.mean(squares)) / length, np.sqrt(means) / length, length
+    return math.sqrt(np.mean(squares)) / length, np.sqrt(means) / length
 
 
 def _line_numbers(shape: Sequence[int], cells: Sequence[int], spacing: Sequence[float]) -> Array:
@@ -330,8 +338,9 @@ def directional_roughness(
     -----
     Every cell between four heights is divided into two triangles by either of its diagonals, with half the
     weight each, so that a mirrored surface gives the mirrored result. A0 of opposite azimuths add up to 1
-    where no facet is level. On a fractal surface the dips, and theta_max most of all, grow as the spacing
-    decreases: compare surfaces of equal spacing.
+    where no facet is level. A periodic axis has no mean slope, and the cells that close it count. On a
+    fractal surface the dips, and theta_max most of all, grow as the spacing decreases: compare surfaces of
+    equal spacing.
 
     References
     ----------
@@ -352,7 +361,7 @@ def directional_roughness(
     [0.309, 0.691]
     """
     directions = read_directions(direction)
-    facets = _facets(np.asarray(surface.values, dtype=np.float64), read_grid(surface).spacing)
+    facets = _facets(np.asarray(surface.values, dtype=np.float64), read_grid(surface))
     measures = np.array([_facing(facets, towards.unit) for towards in directions])
     names = ("area_fraction", "theta_max", "shape", "roughness_metric", "mean_dip")
     return xr.Dataset(
@@ -374,16 +383,17 @@ class Facets(NamedTuple):
     rounding: float
 
 
-def _facets(heights: Array, spacing: Sequence[float]) -> Facets:
+def _facets(heights: Array, grid: Grid) -> Facets:
     """Return the triangles of a plane: four of each cell, two for either diagonal, with half their area.
 
     With the normal n of a triangle and the normal N of the mean plane the rise along a shear t in that plane
     is -(n t)/(n N); it is linear in t.
     """
-    dy, dx = spacing
-    plane_y, plane_x = slopes(heights, spacing)
-    rounding = rounding_of(heights) / min(spacing)
-    heights = detrended(heights, 1)[0]
+    dy, dx = grid.spacing
+    plane_y, plane_x = slopes(heights, grid.spacing, grid.periodic)
+    rounding = rounding_of(heights) / min(grid.spacing)
+    heights = detrended(heights, 1, grid.periodic)[0]
+    heights = np.pad(heights, [(0, int(wraps)) for wraps in grid.periodic], mode="wrap")
     along_x, along_y = np.diff(heights, axis=1) / dx, np.diff(heights, axis=0) / dy
     south, north = along_x[:-1], along_x[1:]  # edges of the cells
     west, east = along_y[:, :-1], along_y[:, 1:]

@@ -196,8 +196,10 @@ def uplift(
     drop = upstream_pressure - low
     drained = 0.0 if drain_pressure is None else (drain_pressure - low) / drop
     points = np.asarray([] if drains is None else drains, dtype=np.float64).reshape(-1, 2)  # (x, y)
-    is_drain = _drain_cells(gap, grid, points, drain_diameter)
-    flow = HeldFlow(grid, _sides(upstream, downstream, gap), is_drain, drained)
+    sides = _sides(upstream, downstream, gap)
+    crossed = {side.axis for side in sides}
+    wraps = grid.periodic[0] and 0 not in crossed, grid.periodic[1] and 1 not in crossed
+    flow = HeldFlow(grid, wraps, sides, _drain_cells(gap, wraps, points, drain_diameter), drained)
     if total_stress is not None:
         gap = gap.transpose(..., "step", "y", "x")
         states = _on_path(gap, flow, float(total_stress), (low, drop))
@@ -267,14 +269,18 @@ def _side(value: Any, gap: xr.DataArray) -> Side:
     return Side(axis, (cell + 0.5) * spacing, False)
 
 
-def _drain_cells(gap: xr.DataArray, grid: Grid, points: Array, diameter: float) -> Array:
+def _drain_cells(gap: xr.DataArray, wraps: Sequence[bool], points: Array, diameter: float) -> Array:
     """Return which cells are drains: those within the diameter of a point, at least the nearest one."""
+    grid = read_grid(gap)
     cells = np.zeros(grid.shape, dtype=bool)
     y, x = (np.asarray(gap[dim].values, dtype=np.float64) for dim in ("y", "x"))
     for point_x, point_y in points:
-        cells[np.abs(y - point_y).argmin(), np.abs(x - point_x).argmin()] = True
+        away = [np.abs(y - point_y), np.abs(x - point_x)]
+        for axis in np.flatnonzero(wraps):  # the shorter way, across the edge or not
+            away[axis] = np.minimum(away[axis], grid.extent[axis] - away[axis])
+        cells[away[0].argmin(), away[1].argmin()] = True
         if diameter > 0:
-            cells |= np.hypot(*np.meshgrid(y - point_y, x - point_x, indexing="ij")) <= diameter / 2.0
+            cells |= np.hypot(*np.meshgrid(*away, indexing="ij")) <= diameter / 2.0
     return cells
 
 
@@ -289,11 +295,12 @@ class Side(NamedTuple):
 class HeldFlow:
     """A plane whose pressure is 1 at the upstream side, 0 at the downstream one, and `drained` at drains."""
 
-    def __init__(self, grid: Grid, sides: tuple[Side, Side], is_drain: Array, drained: float) -> None:
-        self.grid, self.sides, self.is_drain, self.drained = grid, sides, is_drain, drained
+    def __init__(
+        self, grid: Grid, wraps: tuple[bool, bool], sides: tuple[Side, Side], is_drain: Array, drained: float
+    ) -> None:
+        self.grid, self.wraps, self.sides = grid, wraps, sides
+        self.is_drain, self.drained = is_drain, drained
         self.ratio = grid.spacing[0] / grid.spacing[1]
-        crossed = {side.axis for side in sides}
-        self.wraps = grid.periodic[0] and 0 not in crossed, grid.periodic[1] and 1 not in crossed
         self.order = nested_dissection(grid.shape, self.wraps)
 
     def pressure(self, gap: Array) -> tuple[Array, float]:

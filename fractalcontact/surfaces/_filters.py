@@ -147,10 +147,12 @@ def weighted_mean(heights: Array, cutoff: float, spacing: Sequence[float], perio
     observed = np.isfinite(heights)
     reference = float(heights[observed].mean()) if observed.any() else 0.0
     total, weight = np.where(observed, heights - reference, 0.0), observed.astype(float)
-    deviation = math.sqrt(math.log(2.0) / 2.0) / math.pi * cutoff  # a cutoff/sqrt(2 pi), a^2 = ln 2/pi
-    for axis, (step, wraps) in enumerate(zip(spacing, periodic, strict=True)):
-        reach = min(int(cutoff / step), heights.shape[axis])  # the weights have fallen to 1e-6 there
-        weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / deviation) ** 2)
+    for axis, (n, step, wraps) in enumerate(zip(heights.shape, spacing, periodic, strict=True)):
+        # in points; of a periodic axis a cutoff of five periods leaves the mean, and 3e-8 of the longest wave
+        length = min(cutoff / step, 5.0 * n) if wraps else cutoff / step
+        deviation = math.sqrt(math.log(2.0) / 2.0) / math.pi * length  # a cutoff/sqrt(2 pi), a^2 = ln 2/pi
+        reach = int(length if wraps else min(length, n))  # the weights have fallen to 1e-6 there
+        weights = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / deviation))
         weights /= weights.sum()
         mode = "wrap" if wraps else "constant"
         total, weight = (convolve1d(values, weights, axis=axis, mode=mode) for values in (total, weight))

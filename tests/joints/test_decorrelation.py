@@ -36,6 +36,20 @@ def test_periodic_correlation_is_the_autocovariance(make_face, rough):
     np.testing.assert_allclose(result.structure_function.sel(direction="W"), variance, atol=1e-12)
 
 
+def test_a_tilt_across_a_periodic_axis_changes_nothing(make_face):
+    heights, slope = correlated(64, 3.0, 1)[0], 0.5 * np.arange(64)
+    level, tilted = (
+        fc.joints.decorrelation_length(
+            fc.joints.Crack(make_face(face, periodic=(True, False)), block=(64, 32), **MATERIAL),
+            direction="E",
+            shear=np.arange(10.0),
+        )
+        for face in (heights, heights + slope)
+    )
+    np.testing.assert_allclose(tilted.correlation, level.correlation, atol=1e-12)
+    assert tilted.decorrelation_length.item() == pytest.approx(level.decorrelation_length.item(), rel=1e-9)
+
+
 def test_block_sums_on_a_free_face(make_face, rough):
     lower, upper = rough((40, 36), 1), rough((40, 36), 2)
     y, x = np.indices(lower.shape)

@@ -147,3 +147,25 @@ def test_words_and_degrees_are_the_same_directions(make_face):
     np.testing.assert_array_equal(words.azimuth, [45, 180, 270])
     for name in MEASURES:
         np.testing.assert_array_equal(words[name], degrees[name])
+
+
+@pytest.mark.parametrize("shift", [0, 7, 20])
+def test_a_periodic_wave_has_no_slope_and_faces_both_ways(make_face, shift):
+    """A plane through one period of a wave has a slope; the wave has none, and goes on beyond its end."""
+    cells, steepest = 80, 0.3
+    wave = np.sin(2 * np.pi * (np.arange(cells) + shift) / cells) * steepest * cells * S / (2 * np.pi)
+    face = make_face(np.tile(wave, (16, 1)), S, periodic=True)
+    result = fc.joints.directional_roughness(face, direction=["E", "W", "N"])
+    np.testing.assert_allclose(result.area_fraction, [0.5, 0.5, 0.0], atol=1e-9)
+    np.testing.assert_allclose(result.theta_max[:2], np.degrees(np.arctan(steepest)), rtol=1e-3)
+    slope = steepest * np.cos(np.linspace(0, np.pi / 2, 100001))
+    dip = np.average(np.degrees(np.arctan(slope)), weights=np.hypot(1, slope))
+    np.testing.assert_allclose(result.mean_dip[:2], dip, rtol=1e-3)
+
+
+def test_a_periodic_shift_changes_nothing(make_face, rough):
+    heights = 1e-4 * rough((48, 64), 3)
+    faces = [make_face(np.roll(heights, shift, (0, 1)), S, periodic=True) for shift in [(0, 0), (11, 30)]]
+    here, there = (fc.joints.directional_roughness(face, direction=[0, 40, 90, 180]) for face in faces)
+    for name in MEASURES:
+        np.testing.assert_allclose(there[name], here[name], rtol=1e-9, err_msg=name)

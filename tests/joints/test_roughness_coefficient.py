@@ -163,3 +163,32 @@ def test_gaps_are_left_out(make_face, rough):
     assert np.isfinite(fc.joints.roughness_coefficient(make_face(heights, 1e-4)).profile_slope).all()
     with pytest.raises(ValueError, match=r"heights 1 m apart towards E"):
         fc.joints.roughness_coefficient(make_face(heights, 1e-4), lag=1.0)
+
+
+@pytest.mark.parametrize("direction", ["E", "SW", 70.0])
+def test_a_periodic_shift_changes_nothing(make_face, rough, direction):
+    heights = 1e-4 * rough((48, 64), 3)
+    faces = [make_face(np.roll(heights, shift, (0, 1)), S, periodic=True) for shift in [(0, 0), (11, 30)]]
+    here, there = (fc.joints.roughness_coefficient(face, direction=direction, lag=3 * S) for face in faces)
+    assert there.profile_slope.item() == pytest.approx(here.profile_slope.item(), rel=1e-12)
+
+
+def test_slope_of_a_periodic_wave(make_face):
+    """Its differences over one cell are those of all of its cells, the last and the first included."""
+    cells = 40
+    wave = 1e-3 * np.sin(2 * np.pi * np.arange(cells) / cells)
+    result = fc.joints.roughness_coefficient(
+        make_face(np.tile(wave, (4, 1)), S, periodic=True), direction="E"
+    )
+    exact = 1e-3 * 2 * np.sin(np.pi / cells) / S / np.sqrt(2)
+    assert result.profile_slope.item() == pytest.approx(exact, rel=1e-12)
+
+
+def test_azimuth_of_the_lag_is_stated(make_face, rough):
+    face = make_face(1e-4 * rough((40, 40), 2), S)
+    result = fc.joints.roughness_coefficient(face, direction=["E", "NW", 65.0])
+    np.testing.assert_allclose(result.lag_azimuth, [0.0, 135.0, 90.0])
+    assert "another azimuth" in result.roughness_coefficient.attrs["comment"]
+    fine = fc.joints.roughness_coefficient(face, direction=["E", "NW", 65.0], lag=20 * S)
+    np.testing.assert_allclose(fine.lag_azimuth, [0.0, 135.0, 65.0], atol=2.0)
+    assert "another azimuth" not in fine.roughness_coefficient.attrs["comment"]

@@ -107,6 +107,26 @@ def test_a_plane_slides_with_friction_alone(make_face):
     assert "JRC" in result.roughness_coefficient.attrs["comment"]
 
 
+@pytest.mark.parametrize("spring", [None, 1e10])
+def test_a_curve_does_not_depend_on_its_end(surface, spring):
+    # 1 m is 1100 times the displacement of the peak
+    ends = [curve(surface, [0.5e-3, 2e-3, end], normal_stiffness=spring) for end in (3e-3, 0.1, 1.0)]
+    for name in ("dilatancy", "shear_stress", "normal_stress"):
+        for longer in ends[1:]:
+            np.testing.assert_allclose(longer[name][0, :2], ends[0][name][0, :2], rtol=1e-12, err_msg=name)
+
+
+def test_dilation_is_the_integral_of_its_angle(surface):
+    peak, damage = 0.1 / 500 * 100**0.33, 0.7 + 10 / 24
+    places = np.linspace(0, 20 * peak, 2_000_001)
+    share = np.interp(places / peak, [0, 0.3, 0.6, 1, 2, 4, 10, 100], [0, 0, 0.75, 1, 0.85, 0.7, 0.5, 0])
+    slope = np.tan(np.radians(20 * share / damage))
+    integral = np.append(0.0, np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(places)))
+    asked = peak * np.array([0.5, 1, 3, 8, 20])
+    exact = np.interp(asked, places, integral)
+    np.testing.assert_allclose(curve(surface, asked).dilatancy[0], exact, rtol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -259,6 +259,23 @@ def test_drain_of_a_diameter_holds_all_its_cells(make_face):
     np.testing.assert_array_equal(held, np.hypot(y, x) <= 2.05)
 
 
+def test_a_wide_drain_goes_on_across_a_periodic_edge(make_face):
+    options = {"drain_diameter": 7.0, "periodic": True}
+    forces = [
+        uplift(make_face, np.full((40, 30), 1e-4), drains=[(15.5, y)], **options).uplift_force.values[0]
+        for y in (20.5, 0.5, 39.5)
+    ]
+    np.testing.assert_allclose(forces, forces[0], rtol=1e-9)
+
+
+def test_a_wide_drain_ends_at_the_edge_that_water_enters(make_face):
+    """Along the flow nothing is periodic: a drain beside the upstream edge is not also downstream."""
+    gap = np.full((20, 30), 1e-4)
+    free = uplift(make_face, gap, drains=[(0.5, 10.5)], drain_diameter=7.0, periodic=(True, False))
+    periodic = uplift(make_face, gap, drains=[(0.5, 10.5)], drain_diameter=7.0, periodic=True)
+    np.testing.assert_allclose(periodic.fluid_pressure, free.fluid_pressure, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -23,6 +23,17 @@ def test_transmission_of_a_wave(period, axis):
     assert float(filtered.max()) == pytest.approx(2.0 ** -((12 / period) ** 2), abs=1e-5)
 
 
+@pytest.mark.parametrize("n", [3, 5, 8, 40])
+@pytest.mark.parametrize("cutoff", [12, 60, 400])
+def test_a_cutoff_beyond_a_periodic_edge_leaves_the_mean(n, cutoff):
+    """The weights go on around the edge: cut off at it, they passed a twentieth of such a wave."""
+    wave = 1.0 + np.cos(2 * np.pi * np.arange(n) / n)
+    surface = surface_of(np.tile(wave[:, None], (1, 400)), periodic=True)
+    filtered = fc.surfaces.gaussian_filter(surface, cutoff * 1e-6)
+    exact = 1.0 + 2.0 ** -((cutoff / n) ** 2) * np.cos(2 * np.pi * np.arange(n) / n)
+    np.testing.assert_allclose(filtered[:, 2], exact, atol=3e-5)
+
+
 @pytest.mark.parametrize("cutoff", [4, 6, 12])
 @pytest.mark.parametrize("period", [4, 6, 8, 16])
 def test_stated_error_holds_from_four_spacings_on(cutoff, period):
