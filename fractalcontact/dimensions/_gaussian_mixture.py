@@ -43,9 +43,6 @@ _SPREAD_STEPS = 0.25, 0.1
 # Exponent below which a Gaussian does not count: far below rounding, yet no product of two is denormal. Such
 # numbers doubled the time of transforms
 FADED = -100.0
-# Spacings: aliases of longer waves differ by azimuth by less than 5 % for H above .1, and five bins of
-# shorter waves show H where longer ones have another exponent
-CLEAR_WAVELENGTH = 6.0
 FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
 
 

@@ -21,14 +21,7 @@ import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
-from fractalcontact.dimensions._gaussian_mixture import (
-    CLEAR_WAVELENGTH,
-    FORMS,
-    Bins,
-    Lattice,
-    spread_nodes,
-    weights,
-)
+from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, spread_nodes, weights
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
@@ -45,7 +38,8 @@ TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/3
 # than the pilot 18, 1.6)
 _SAMPLES = 64, 256
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
-_ALIASED = 0.25 * math.pi  # radians per point from which on aliases differ by azimuth by a per mille
+# Radians per point: aliases of longer waves differ by azimuth by less than 5 % for H above .1
+_ALIASED = math.pi / 3.0
 FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
 _SECTORS = 9  # of azimuth in a quarter of the plane: an odd number, so that no sector ends at the diagonal
 _OCTAVE = math.log(2.0)
@@ -190,7 +184,7 @@ def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
     """Return the levels of some modes; `ratio` is their power over that expected."""
     y, x = lattice.wavenumbers
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
-    limit = 2.0 * math.pi / (CLEAR_WAVELENGTH * max(lattice.spacing))
+    limit = _ALIASED / max(lattice.spacing)
     near_y, near_x = (np.flatnonzero(np.abs(along) < limit) for along in (y, x))
     is_near = np.hypot(y[near_y, None], x[near_x]) < limit
     rows, columns = np.nonzero(keep[np.ix_(near_y, near_x)] & is_near)

@@ -107,7 +107,10 @@ def test_fbm_within_bound(hurst, method):
 def test_periodic_surfaces(hurst, cut):
     surface = fc.surfaces.spectral((160, 160), 1e-3, hurst=hurst, rms_height=1e-5, rng=23, **cut)
     result = estimate(surface, ["default", "spectrum", "increments"])
-    assert float(result.hurst[0]) == pytest.approx(hurst, abs=0.1 if cut else 0.03)
+    # of 20 surfaces with all cuts the errors are .03 (H = .8) and .10 (.2), standard errors .03 and .06
+    error = 2.0 * float(result.standard_error[0]) if cut else 0.03
+    assert float(result.hurst[0]) == pytest.approx(hurst, abs=error)
+    assert float(result.standard_error[0]) < 0.1
     assert float(result.ci_low[0]) < hurst < float(result.ci_high[0])
     assert np.isnan(result.ci_low[2])
     assert "periodic" in str(result.reason.sel({"method": "increments"}).values)
