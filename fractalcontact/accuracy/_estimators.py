@@ -58,6 +58,7 @@ def _check(problems: Problems) -> None:
     given = problems.given
     for name in ("blur", "noise", "marks"):
         problems.number(name, at_least=0.0)
+    problems.boolean("progress")
     problems.numbers("hurst", **HURST_RANGE)
     has_sizes = problems.numbers("sizes", at_least=16, integral=True)
     chosen = problems.choices("families", among=FAMILIES)

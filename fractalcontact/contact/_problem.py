@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -210,34 +210,42 @@ def is_periodic(boundary: str | None, wraps: bool) -> bool:
     return wraps if boundary is None else boundary == "periodic"
 
 
-def check_problem(problems: Problems, *, leading: bool = False, **replaced: Any) -> LoadPath | None:
-    """Check surface, modulus, load and options of a contact problem; return the load unless it is wrong.
+class ContactProblem(NamedTuple):
+    """A contact problem in SI units but for its heights, as `solver.solve` takes it."""
 
-    They are the arguments of the call, or what replaces these.
-    """
-    arguments = vars(problems.given) | replaced
-    surface, contact_modulus = arguments["surface"], arguments["contact_modulus"]
+    grid: Grid
+    contact_modulus: float
+    options: ContactOptions
+    load: LoadPath
+
+
+def check_problem(problems: Problems, *, leading: bool = False, **replaced: Any) -> ContactProblem | None:
+    """Check surface, modulus, load and options of a call, or what replaces them; return them if valid."""
+    given, arguments = problems.given, vars(problems.given) | replaced
+    problems.boolean("progress")
     surface_is_valid = problems.surface("surface", leading=leading)
     problems.number("contact_modulus", above=0)
     options = problems.construct(ContactOptions.among, arguments)
     load = problems.construct(LoadPath.among, arguments)
     if not surface_is_valid or options is None:
-        return load
-    grid = read_grid(surface)
+        return None
+    grid = read_grid(given.surface)
     options.check_grid(grid, problems)
     if load is None or problems.messages:
-        return load
-    ranges = np.ptp(np.asarray(surface.values, np.float64).reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
+        return None
+    problem = ContactProblem(grid, float(given.contact_modulus), options, load)
+    heights = np.asarray(given.surface.values, np.float64)
+    ranges = np.ptp(heights.reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
     for height_range in {float(ranges.min()), float(ranges.max())}:
-        check_scale(problems, grid, height_range, float(contact_modulus), options, load)
+        check_scale(problems, height_range, *problem)
     options.check_load(load, grid.nominal_area, problems)
-    return load
+    return problem
 
 
 def check_scale(
     problems: Problems,
-    grid: Grid,
     height_range: float,
+    grid: Grid,
     contact_modulus: float,
     options: ContactOptions,
     load: LoadPath,

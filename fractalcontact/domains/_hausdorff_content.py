@@ -187,6 +187,7 @@ EXPONENTS = np.linspace(0.5, 2.0, 61)  # between which that of the stationary co
 
 def _check_masks(problems: Problems) -> None:
     given = problems.given
+    problems.boolean("corrected")
     is_list = isinstance(given.masks, (list, tuple)) and len(given.masks) > 1
     if not problems.require(is_list, "masks", "a list of two masks or more"):
         return
