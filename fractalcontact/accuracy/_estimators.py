@@ -34,8 +34,10 @@ Stream = np.random.Generator
 WHERE = "fractalcontact.accuracy.estimators"
 TITLE = "Estimators of the Hurst exponent on surfaces of known exponent"
 REFERENCES = "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63"
-SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
-ROLLOFF = 8.0  # edge over the wavelength of the corner of the roll-off
+SHORTEST = 4.0  # spacings: shortest wave of the band-limited family, twice that which the grid can hold
+# edge over the wavelength of the corner of the roll-off: the covariance at the extent is then rounding, 1e-21
+# (see `matern`); with 4 it would be 6e-11
+ROLLOFF = 8.0
 SPACING, HEIGHT = 1e-4, 1e-6  # m: no result depends on them
 
 DIMS = ("method", "family", "hurst", "size")

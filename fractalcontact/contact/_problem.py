@@ -390,7 +390,7 @@ class Solution:
 
 @lru_cache(maxsize=KEPT)
 def kept_operator(body: Body) -> HalfSpaceOperator:
-    """Return the operator of a small free body; its table takes as long as a solution."""
+    """Return the operator of a small free body, see `SMALL`."""
     return HalfSpaceOperator(body.influence_table())
 
 
