@@ -20,8 +20,8 @@ from fractalcontact.base.validation import NONE, Problems
 Pair = tuple[float, float]
 
 WHERE = "fractalcontact.joints.Crack"
-# cells: a shift this close to whole cells is rounded to them; sums of 20 000 steps of five spacings missed them
-# by up to 7e-9
+# cells: a shift this close to whole cells is rounded to them; sums of 20 000 steps, of five spacings, missed
+# them by up to 7e-9
 SHIFT_ROUNDING = 1e-6
 MATERIAL = ("young", "poisson")
 FILL = "see fractalcontact.surfaces.fill"
