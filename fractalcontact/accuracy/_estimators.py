@@ -290,8 +290,8 @@ def matern(shape: tuple[int, ...], hurst: float, corner: float, count: int, stre
     power = np.maximum(np.fft.fft2(covariance).real, 0.0)
     result = np.empty((count, *shape))
     for heights in result:
-        whole = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
-        heights[...] = whole[: shape[0], : shape[1]]
+        embedded = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
+        heights[...] = embedded[: shape[0], : shape[1]]
     return result
 
 

@@ -605,15 +605,15 @@ def _label_variable(name: str, variable: xr.Variable, kept: tuple[str, ...], *, 
     if name not in QUANTITIES:
         where = "`public_result(quantities=...)` of its function, or `base/schema.py`"
         raise KeyError(f"variable {name!r} has no unit: give it a Quantity in {where}")
-    quantity, given = QUANTITIES[name], variable.attrs
+    quantity, stated = QUANTITIES[name], variable.attrs
     attributes = quantity.labels.copy()
-    if name in CORE_DIMS and "period" in given:
-        attributes["period"] = float(given["period"])
-    if kept and given.get("units") == "1":
+    if name in CORE_DIMS and "period" in stated:
+        attributes["period"] = float(stated["period"])
+    if kept and stated.get("units") == "1":
         attributes |= in_cells(name)
-    if kept and given.get("units") in quantity.other_units:
-        attributes["units"] = given["units"]
-    variable.attrs = attributes | {key: given[key] for key in kept if key in given}
+    if kept and stated.get("units") in quantity.other_units:
+        attributes["units"] = stated["units"]
+    variable.attrs = attributes | {key: stated[key] for key in kept if key in stated}
     variable.encoding = _encoding(variable, is_coordinate=is_coordinate)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import Array, float_array, power_of_two
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
-from fractalcontact.base.study import PAPER, joined_references
+from fractalcontact.base.study import BORRI_BRUNETTO_1998, joined_references
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._operator import (
@@ -36,10 +36,10 @@ CONTROL_UNITS = {"closure": "m", "normal_force": "N", "nominal_pressure": "Pa"}
 CONTROLS = tuple(CONTROL_UNITS)
 SOLVER_SOURCES = {
     "fast": "Polonsky and Keer, Wear 231:206 (1999); Bugnicourt et al., Tribol. Lett. 66:29 (2018)",
-    "elimination": PAPER,
+    "elimination": BORRI_BRUNETTO_1998,
 }
 INFLUENCE_SOURCES = {
-    "disc": PAPER,
+    "disc": BORRI_BRUNETTO_1998,
     "square": "Love, Phil. Trans. R. Soc. A 228:377 (1929)",
     "spectral": "Stanley and Kato, J. Tribol. 119:481 (1997)",
 }
@@ -279,9 +279,9 @@ def check_scale(
     scale = unit / (grid.nominal_area if load.control == "nominal_pressure" else 1.0)
     low, high, unit_name = scale / greatest_ratio, scale * greatest_ratio, CONTROL_UNITS[load.control]
     expected = f"0 or between {low:.3g} and {high:.3g} {unit_name} for this surface and modulus"
-    for given, value in zip(load.values, values, strict=True):
+    for imposed, value in zip(load.values, values, strict=True):
         in_range = value == 0 or unit / greatest_ratio < value < unit * greatest_ratio
-        problems.require(in_range, load.control, expected, f"{given:g} {unit_name}")
+        problems.require(in_range, load.control, expected, f"{imposed:g} {unit_name}")
     return len(problems.messages) == before
 
 

@@ -12,7 +12,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import slopes
 from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
@@ -41,7 +41,7 @@ def _check(problems: Problems) -> JointProblem | None:
     return check_problem(problems)
 
 
-@public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESS_BYTES)
+@public_result(title="dilatancy of a crack", references=BORRI_BRUNETTO_1998, check=_check, memory=PRESS_BYTES)
 @takes_checked
 def dilatancy(
     problem: JointProblem | None,

@@ -69,9 +69,9 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
         problems.add("direction", expected, towards.name)
         return
     cells = turning_points / step
-    whole = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
+    on_grid = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
     expected = f"multiples of {step:g} m, the cells along {towards.name}: wear stays on the grid"
-    if problems.require(whole, "path", expected, turning_points.tolist()):
+    if problems.require(on_grid, "path", expected, turning_points.tolist()):
         moves = bool((np.diff(np.rint(cells)) != 0).all())
         problems.require(
             moves, "path", "positions other than the one before, the first not 0", turning_points
@@ -318,15 +318,15 @@ def _peaks(positions: Array, columns: dict[str, Array], length: float) -> dict[s
         work[:, 1:] = np.cumsum(stress[:, 1:] * np.diff(slip), axis=1)
         means.append(secant_slopes(slip, work.T, np.array([length]))[0])  # (point, test)
     shear, normal = means
-    known = np.isfinite(shear)  # not where the window would end beyond the leg, or the joint was crushed
-    peak = np.where(known, shear, -np.inf).max(axis=0)
-    ratio = np.where(known, shear / normal, -np.inf).max(axis=0)
-    last = known.shape[0] - 1 - known[::-1].argmax(axis=0)
-    any_known = known.any(axis=0)
+    is_known = np.isfinite(shear)  # not where the window would end beyond the leg, or the joint was crushed
+    peak = np.where(is_known, shear, -np.inf).max(axis=0)
+    ratio = np.where(is_known, shear / normal, -np.inf).max(axis=0)
+    last = is_known.shape[0] - 1 - is_known[::-1].argmax(axis=0)
+    has_mean = is_known.any(axis=0)
     return {
-        "peak_shear_strength": np.where(any_known, peak, np.nan),
-        "peak_friction_angle": np.where(any_known, np.degrees(np.arctan(ratio)), np.nan),
-        "residual_shear_strength": np.where(any_known, shear[last, np.arange(last.size)], np.nan),
+        "peak_shear_strength": np.where(has_mean, peak, np.nan),
+        "peak_friction_angle": np.where(has_mean, np.degrees(np.arctan(ratio)), np.nan),
+        "residual_shear_strength": np.where(has_mean, shear[last, np.arange(last.size)], np.nan),
     }
 
 
@@ -412,10 +412,10 @@ class WornJoint:
 
     def faces(self) -> tuple[xr.DataArray, xr.DataArray]:
         """Return the whole lower and upper face as they are worn now."""
-        whole = self.crack.lower if self.crack.upper is None else self.crack.upper
-        heights = np.array(whole.values, dtype=np.float64)
+        upper = self.crack.lower if self.crack.upper is None else self.crack.upper
+        heights = np.array(upper.values, dtype=np.float64)
         heights[self.crack.layout.slices] += self.upper_wear
-        return self.crack.lower.copy(data=self.crack.faces()[0] - self.lower_wear), whole.copy(data=heights)
+        return self.crack.lower.copy(data=self.crack.faces()[0] - self.lower_wear), upper.copy(data=heights)
 
     def report(self, state: State, first: float) -> dict[str, float]:
         """Return what is reported of a state, with the height of the block at the start."""
@@ -526,7 +526,7 @@ def balanced_step(
 def _mean(first: Any, second: Any, share: float) -> Any:
     """Return the mean of two steps or of two of their numbers, the second with this share."""
     if isinstance(first, (ShearStep, State)):
-        return type(first)(*(_mean(one, other, share) for one, other in zip(first, second, strict=True)))
+        return type(first)(*(_mean(a, b, share) for a, b in zip(first, second, strict=True)))
     return first + share * (second - first)
 
 

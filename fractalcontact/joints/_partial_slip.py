@@ -16,7 +16,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.signals import track
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
 from fractalcontact.joints._sheared_contact import LOADS, JointProblem, ShearedContact, check_problem, stacked
@@ -53,7 +53,7 @@ def _check(problems: Problems) -> tuple[JointProblem, ShearPath] | None:
 
 @public_result(
     title="Partial slip of a joint",
-    references=PAPER,
+    references=BORRI_BRUNETTO_1998,
     reasons=dict.fromkeys(STIFFNESSES, RIGID),
     check=_check,
     memory=360.0,  # of a cell: both directions of a free body (320), delta-surface and flat block

@@ -28,7 +28,7 @@ from fractalcontact.base.numbers import Array, number_of_entries
 from fractalcontact.base.provenance import differing
 from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.signals import track
-from fractalcontact.base.study import PAPER, joined_references, provenance_of
+from fractalcontact.base.study import BORRI_BRUNETTO_1998, joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights
@@ -66,7 +66,7 @@ class JointProblem:
     @property
     def references(self) -> str:
         """The sources of the closure of a delta-surface and of the solver that presses it."""
-        return joined_references(PAPER, self.options.references(self.grid))
+        return joined_references(BORRI_BRUNETTO_1998, self.options.references(self.grid))
 
     @cached_property
     def modulus(self) -> float:
@@ -207,7 +207,7 @@ def closure_columns(
         if spring is not None:
             at_rest = ShearedContact.of_crack(problem, 0.0, towards).press(problem.load)
         for j, shear in enumerate(track(shears, progress, f"press, towards {towards.name}", unit="shear")):
-            columns = None if pressed is None else _held_columns(pressed, shear, towards, problem.load)
+            columns = None if pressed is None else _pressed_columns(pressed, shear, towards, problem.load)
             if columns is None:
                 contact = ShearedContact.of_crack(problem, float(shear), towards)
                 if spring is None or at_rest is None:
@@ -292,7 +292,7 @@ def _check_pressed(problems: Problems) -> None:
     problems.require(number_of_entries(given.keep) == 0, "pressed", "nothing beside `keep`")
 
 
-def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: LoadPath) -> Columns | None:
+def _pressed_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: LoadPath) -> Columns | None:
     """Return the columns of `ShearedContact.press` from a result of `closure`; None if it lacks a load."""
     names, shears = np.atleast_1d(pressed["direction"].values), pressed["shear"].values
     if towards.name not in names or shear not in shears:
@@ -300,13 +300,13 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     place: dict[str, Any] = {"direction": int(np.flatnonzero(names == towards.name)[0])}
     place |= {"shear": int(np.flatnonzero(shears == shear)[0])}
     at_shear = pressed.isel(place, missing_dims="ignore")
-    held = at_shear[load.control].values
-    steps = [np.flatnonzero(held == value) for value in load.values]
-    if not all(found.size for found in steps):
+    loads = at_shear[load.control].values
+    steps = [np.flatnonzero(loads == value) for value in load.values]
+    if not all(places.size for places in steps):
         return None
-    if "plastic_work" in at_shear and not np.array_equal(held[: len(steps)], load.values):
+    if "plastic_work" in at_shear and not np.array_equal(loads[: len(steps)], load.values):
         return None  # what yielded depends on the path
-    at_load = at_shear.isel(step=[int(found[0]) for found in steps])
+    at_load = at_shear.isel(step=[int(places[0]) for places in steps])
     of_steps = [str(name) for name, variable in at_load.variables.items() if variable.dims == ("step",)]
     columns = {name: at_load[name].values for name in of_steps if name != "step"}
     return columns | {"rms_slope": at_load["rms_slope"].values, "solver": np.full(len(steps), "as pressed")}

@@ -14,7 +14,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import fitted_slope
 from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import POSITIVE, size_factors
@@ -136,7 +136,7 @@ def self_weight(
     lifted, _ = rigid_dilatancies(crack, shears, directions)
     opening = np.repeat(lifted[..., None], sizes.size, axis=-1)
     variables: dict[str, Any] = {}
-    attributes: dict[str, Any] = {"references": PAPER}
+    attributes: dict[str, Any] = {"references": BORRI_BRUNETTO_1998}
     if problem is not None:
         columns = closure_columns(problem, shears, directions)
         opening -= columns["interface_closure"]
