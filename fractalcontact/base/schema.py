@@ -39,7 +39,9 @@ class Quantity:
         return {"long_name": self.long_name} | units | self.attributes
 
 
-STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
+# rms slope beyond which strains are not small: the shear strain under a flattened wave is up to its slope
+# over e (1 - nu), about half of it
+STEEP = 0.3
 # exponents with which surfaces are made; the circulant embedding is positive at .001 and .999 as well, where
 # heights are nearly white noise, or a plane
 HURST_RANGE: dict[str, Any] = {"at_least": 0.01, "at_most": 0.99}
