@@ -8,7 +8,9 @@ wrong arguments, missing numbers, threads and processes, damaged arguments. A ne
 import functools
 import importlib
 import inspect
+import os
 import tempfile
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +142,13 @@ def image_file():
     return PLACE / "mask.png"
 
 
+def place():
+    """Return a folder of this thread, for the files that a call writes."""
+    folder = PLACE / f"{os.getpid()}-{threading.get_ident()}"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
 GENERATOR = {"shape": (8, 8), "spacing": SPACING, "hurst": 0.5, "rng": 1}
 PRESS = {"contact_modulus": 1e9, "nominal_pressure": 1e4}
 
@@ -204,7 +213,7 @@ CALLS = {
     "joints.uplift": lambda: {"gap": pressed()["gap"], "upstream_pressure": 1e5, "drains": [(8e-4, 8e-4)]},
     "domains.area_dimension": lambda: {"masks": [pressed()["state"], pressed()["state"][..., ::2, ::2]]},
     "domains.read_mask": lambda: {"path": image_file(), "spacing": SPACING},
-    "save": lambda: {"result": rough(), "path": PLACE / "saved.nc"},
+    "save": lambda: {"result": rough(), "path": place() / "saved.nc"},
     "open": lambda: {"path": file("opened")},
     "scenes.load": lambda: {"path": "pressed_surface"},
     "scenes.plan": lambda: {"scene": fc.scenes.load("rigid_sliding")},
@@ -212,10 +221,10 @@ CALLS = {
     "scenes.summary": lambda: {"tree": study()},
     "scenes.datasheet": lambda: {"tree": xr.DataTree.from_dict({"/joints/closure_laws": laws()})},
     "scenes.reproduce": lambda: {"result": rough()},
-    "scenes.report": lambda: {"result": study(), "path": PLACE / "report.html"},
+    "scenes.report": lambda: {"result": study(), "path": place() / "report.html"},
     "scenes.tables": lambda: {"result": study()},
-    "scenes.export": lambda: {"result": rough(), "folder": PLACE / "maps", "to": "tiff", "force": True},
-    "scenes.template": lambda: {"question": "roughness", "scan": file("scan"), "folder": PLACE},
+    "scenes.export": lambda: {"result": rough(), "folder": place() / "maps", "to": "tiff", "force": True},
+    "scenes.template": lambda: {"question": "roughness", "scan": file("scan"), "folder": place()},
     "plotting.surface": lambda: {"surface": rough(), "block": rough()[:8, :8]},
     "plotting.field": lambda: {"data": pressed()["gap"].isel(step=0)},
     "plotting.plot contact_domains": lambda: {"result": pressed()},
@@ -240,7 +249,7 @@ CALLS = {
     "plotting.plot error_against_time": lambda: {"result": measured()},
     "plotting.plot estimator_errors": lambda: {"result": estimators()},
     "plotting.plot slip_loops": lambda: {"result": result_of("joints.partial_slip")},
-    "plotting.draw": lambda: {"tree": study(), "folder": PLACE / "figures"},
+    "plotting.draw": lambda: {"tree": study(), "folder": place() / "figures"},
     "accuracy.benchmarks": lambda: {"subpackage": "surfaces"},
     "accuracy.summary": lambda: {"results": estimators()},
     "accuracy.estimators": lambda: {"hurst": 0.5, "sizes": 8, "families": "nothing", "members": 2},

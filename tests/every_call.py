@@ -4,7 +4,6 @@
 a process that is forked afterwards; it prints what differs, as JSON.
 """
 
-import functools
 import hashlib
 import importlib
 import json
@@ -21,8 +20,7 @@ from pathlib import Path
 import numpy as np
 import test_labels
 import xarray as xr
-from calls import CALLS as ARGUMENTS
-from calls import crack, labelled_functions, measured, rough
+from calls import CALLS, measured
 from study import SOUND
 
 import fractalcontact as fc
@@ -44,58 +42,42 @@ LEFT_OUT = {
 CALLED = [name for name in fc.__all__ if name not in ("plotting", "save", "open")]
 
 
-@functools.cache
-def study():
-    """Return a finished study, for the functions that read one."""
+def run():
     folder = Path(tempfile.mkdtemp())
     (folder / "small.toml").write_text(SCENE, encoding="utf-8")
-    return fc.scenes.run(folder / "small.toml", out=folder, progress=False), folder
-
-
-def scene():
-    return study()[1] / "small.toml"
-
-
-def opened(folder):
-    return fc.open(fc.save(rough(), folder / "opened.nc"))
-
-
-def run(folder):
-    tree = fc.scenes.run(scene(), out=folder / "run", progress=False)
+    tree = fc.scenes.run(folder / "small.toml", out=folder / "run", progress=False)
     assert fc.open(folder / "run" / "result.nc").attrs["provenance"] == tree.attrs["provenance"]
     return tree
 
 
-CALLS = {
-    "save": lambda folder: xr.open_dataset(fc.save(rough(), folder / "saved.nc")).load(),
-    "open": opened,
-    "contact.effective_modulus": lambda _: fc.contact.effective_modulus(1e9, 0.2),
-    "contact.effective_poisson": lambda _: fc.contact.effective_poisson(1e9, 0.2),
-    "contact.flat_stiffness": lambda _: fc.contact.flat_stiffness((20, 20), 1e-4, contact_modulus=1e9),
-    "dimensions.methods": lambda _: fc.dimensions.methods(),
-    "joints.Crack": lambda _: crack().faces()[0],
-    "scenes.json_schema": lambda _: fc.scenes.json_schema(),
-    "scenes.load": lambda _: str(fc.scenes.load(scene()).tables),
-    "scenes.validate": lambda _: str(fc.scenes.validate(scene()).tables),
-    "scenes.plan": lambda _: str(fc.scenes.plan(fc.scenes.load(scene()))),
-    "scenes.report": lambda folder: fc.scenes.report(study()[0], folder / "report.html").name,
-    "scenes.reproduce": lambda _: fc.scenes.reproduce(study()[0]["joints/closure"].to_dataset()),
+# calls that the table of all tests has not, as they have no arguments or take long, or has to be refused
+FURTHER = {
+    "dimensions.methods": fc.dimensions.methods,
+    "scenes.json_schema": fc.scenes.json_schema,
     "scenes.run": run,
-    "scenes.summary": lambda _: fc.scenes.summary(study()[0]),
-    "scenes.template": lambda folder: fc.scenes.template(
-        "roughness", fc.save(rough(), folder / "scan.nc"), folder=folder
-    ),
-    "scenes.export": lambda folder: str(
-        [path.name for path in fc.scenes.export(rough(), folder / "maps", to="tiff", force=True)]
-    ),
-    "scenes.tables": lambda _: str(sorted(fc.scenes.tables(study()[0]))),
-    "accuracy.benchmarks": lambda _: str([b.name for b in fc.accuracy.benchmarks("surfaces")]),
-    "accuracy.estimators": lambda _: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),
-    "accuracy.measure": lambda _: str(sorted(measured().children)),
-    "plotting.draw": lambda folder: str(
-        sorted(path.name for path in fc.plotting.draw(study()[0], folder / "figures"))
-    ),
-    "accuracy.summary": lambda _: fc.accuracy.summary(measured())[:20],
+    "accuracy.estimators": lambda: fc.accuracy.estimators(0.5, 16, "fbm", "increments", members=4, rng=1),
+    "accuracy.measure": measured,
+}
+
+
+def without_times(text):
+    return "".join(letter for letter in text if not letter.isdigit() and letter not in " .")
+
+
+# what is compared of results that are no data
+COMPARED = {
+    "save": fc.open,
+    "joints.Crack": lambda crack: crack.faces()[0],
+    "scenes.load": lambda scene: scene.tables,
+    "scenes.validate": lambda scene: scene.tables,
+    "scenes.report": lambda path: path.name,
+    "scenes.export": lambda paths: [path.name for path in paths],
+    "scenes.summary": without_times,
+    "scenes.tables": sorted,
+    "accuracy.benchmarks": lambda benchmarks: [benchmark.name for benchmark in benchmarks],
+    "accuracy.measure": lambda tree: sorted(tree.children),
+    "accuracy.summary": without_times,
+    "plotting.draw": lambda paths: sorted(path.name for path in paths),
 }
 
 
@@ -109,13 +91,13 @@ def names():
 
 
 def has_call(name):
-    return name in CALLS or (name in ARGUMENTS and name in labelled_functions())
+    return name in FURTHER or name in CALLS
 
 
-def fingerprint(name, folder):
+def fingerprint(name):
     """Return a digest of the numbers that a function returns; run times are left out."""
-    folder.mkdir(exist_ok=True)
-    result = CALLS[name](folder) if name in CALLS else test_labels.result_of(name)
+    result = FURTHER[name]() if name in FURTHER else test_labels.result_of(name)
+    result = COMPARED.get(name, lambda unchanged: unchanged)(result)
     if isinstance(result, xr.DataArray):
         result = result.to_dataset(name="values")
     if isinstance(result, xr.Dataset):
@@ -129,18 +111,15 @@ def fingerprint(name, folder):
         ]
     if isinstance(result, np.ndarray):
         result = result.tobytes()
-    text = repr(result)
-    if name == "scenes.summary":
-        text = "".join(letter for letter in text if not letter.isdigit() and letter not in " .")
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(repr(result).encode()).hexdigest()
 
 
 def fingerprints(order=None, expected=None):
     """Return the digest of every function, or the error; those that are as expected are left out."""
-    folder, found = Path(tempfile.mkdtemp()), {}
+    found = {}
     for name in order or names():
         try:
-            found[name] = fingerprint(name, folder)
+            found[name] = fingerprint(name)
         except BaseException:
             found[name] = traceback.format_exc(limit=-3)
     return {name: value for name, value in found.items() if value != (expected or {}).get(name)}

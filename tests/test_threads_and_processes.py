@@ -34,7 +34,7 @@ print([number.hex() for name in ('hurst', 'ci_low', 'ci_high') for number in r[n
 
 def test_every_public_function_has_a_call():
     assert [name for name in every_call.names() if not every_call.has_call(name)] == []
-    assert not (set(every_call.CALLS) | every_call.LEFT_OUT) - {*every_call.names(), *every_call.LEFT_OUT}
+    assert not {*every_call.FURTHER, *every_call.COMPARED} - {*every_call.names()}
 
 
 @pytest.mark.processes

@@ -34,8 +34,10 @@ Stream = np.random.Generator
 WHERE = "fractalcontact.accuracy.estimators"
 TITLE = "Estimators of the Hurst exponent on surfaces of known exponent"
 REFERENCES = "Whittle, Curve and periodogram smoothing, J. R. Stat. Soc. B 19 (1957) 38-63"
-SHORTEST = 4.0  # spacings: the shortest wave of the band-limited family
-ROLLOFF = 8.0  # edge over the wavelength of the corner of the roll-off
+SHORTEST = 4.0  # spacings: shortest wave of the band-limited family, twice that which the grid can hold
+# edge over the wavelength of the corner of the roll-off: the covariance at the extent is then rounding, 1e-21
+# (see `matern`); with 4 it would be 6e-11
+ROLLOFF = 8.0
 SPACING, HEIGHT = 1e-4, 1e-6  # m: no result depends on them
 
 DIMS = ("method", "family", "hurst", "size")
@@ -58,6 +60,7 @@ def _check(problems: Problems) -> None:
     given = problems.given
     for name in ("blur", "noise", "marks"):
         problems.number(name, at_least=0.0)
+    problems.boolean("progress")
     problems.numbers("hurst", **HURST_RANGE)
     has_sizes = problems.numbers("sizes", at_least=16, integral=True)
     chosen = problems.choices("families", among=FAMILIES)
@@ -287,8 +290,8 @@ def matern(shape: tuple[int, ...], hurst: float, corner: float, count: int, stre
     power = np.maximum(np.fft.fft2(covariance).real, 0.0)
     result = np.empty((count, *shape))
     for heights in result:
-        whole = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
-        heights[...] = whole[: shape[0], : shape[1]]
+        embedded = np.fft.ifft2(np.fft.fft2(stream.standard_normal(lag.shape)) * np.sqrt(power)).real
+        heights[...] = embedded[: shape[0], : shape[1]]
     return result
 
 

@@ -48,12 +48,12 @@ def files_of(pattern: str, folder: Path = Path()) -> dict[str, str]:
     name = os.path.expandvars(pattern)
     pattern = Path(os.path.normpath(folder.absolute() / name)).as_posix()  # the folder may not exist yet
     paths = glob(pattern, recursive=True)  # noqa: PTH207 `Path.glob` takes no absolute one
-    found = sorted(Path(path).as_posix() for path in paths if Path(path).is_file())
+    names = sorted(Path(path).as_posix() for path in paths if Path(path).is_file())
     groups = (GROUPS.get(part, f"({part.replace('[!', '[^')})") for part in WILDCARD.findall(pattern))
     fixed = [re.escape(text) for text in WILDCARD.split(pattern)]
     expression = re.compile("".join(text for pair in zip(fixed, [*groups, ""], strict=True) for text in pair))
     files = {}
-    for path in found:
+    for path in names:
         match = expression.fullmatch(path)
         key = "_".join(filter(None, match.groups())) if match else path
         files[key] = path if Path(name).is_absolute() else Path(os.path.relpath(path, folder)).as_posix()

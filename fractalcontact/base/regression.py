@@ -25,7 +25,9 @@ from fractalcontact.base.numbers import Array, power_of_two
 # smallest singular value over the largest for which the points fix the polynomial: it is 6e-17 of a plane
 # through one line, 2e-6 through two neighbouring rows of 512 points, 6e-8 of 4096
 RANK = 1e-10
-ROUNDING = 64.0 * np.finfo(np.float64).eps  # of the greatest height: smaller residuals of planes are rounding
+# of the greatest height: up to which the residual of a plane is rounding; that of 800 random planes was at
+# most 3.4 eps
+ROUNDING = 64.0 * np.finfo(np.float64).eps
 
 
 def shifted(heights: Array) -> tuple[Array, float, float]:

@@ -14,6 +14,9 @@ entries of its provenance, except `title` and `references`, which replace those 
 `parameters`, a dict that replaces recorded arguments (a default that depends on others, a path to
 shorten), and `completeness`, which stays an attribute: it lists what a stopped run left out.
 
+What a check has read of the arguments (options, a load) can be handed on: under `takes_checked` the function
+takes what its check returns in front of the arguments of the call.
+
 A problem that only the body finds is raised without the name of a function, by `base.validation.require` or
 as an `InvalidInput`; the decorator adds the name of the one that was called.
 """
@@ -25,7 +28,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
-from typing import Any, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -70,6 +73,15 @@ class PublicFunction(Protocol[P, R_co]):
         """Raise `InvalidInput` if the call would."""
 
 
+def takes_checked(function: Callable[Concatenate[Any, P], R]) -> Callable[P, R]:
+    """Declare that a function takes what its check returns as a first argument, which callers do not see."""
+    signature = inspect.signature(function)
+    parameters = list(signature.parameters.values())[1:]
+    function.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    function.takes_checked = True  # type: ignore[attr-defined]
+    return cast("Callable[P, R]", function)
+
+
 def public_result(
     *,
     title: str,
@@ -95,7 +107,7 @@ def public_result(
         The error in words, for a result without a number for it.
     check : callable, optional
         Called as ``check(problems)`` before the function, with a `Problems` that has every argument, defaults
-        included; its problems are raised together. Arguments declared as `bool` are checked already.
+        included; its problems are raised together.
     error : type, default InvalidInput
         The exception that lists the problems.
     in_blocks : bool
@@ -117,14 +129,10 @@ def public_result(
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
         signature = inspect.signature(function)
         name = public_name(function)
-        # no word is true: what is declared as a flag is True or False
-        flags = sorted(
-            word for word, parameter in signature.parameters.items() if parameter.annotation == "bool"
-        )
-
+        hands_on = hasattr(function, "takes_checked")
         takes_spacing = SURFACE in signature.parameters and SPACING not in signature.parameters
 
-        def checked(arguments: Any, options: dict[str, Any]) -> tuple[inspect.BoundArguments, str]:
+        def checked(arguments: Any, options: dict[str, Any]) -> tuple[inspect.BoundArguments, str, Any]:
             spacing = options.pop(SPACING, None) if takes_spacing else None
             try:
                 bound = signature.bind(*arguments, **options)
@@ -141,22 +149,20 @@ def public_result(
             if not in_blocks and (loaded := loaded_bytes(bound.arguments)):
                 require_memory(name, loaded, _size_of(bound.arguments))
             with Problems(name, error, bound.arguments) as problems:
-                for flag in flags:
-                    problems.boolean(flag)
-                if check is not None:
-                    check(problems)
+                checked_values = None if check is None else check(problems)
             needed = peak_of(memory, bound.arguments, in_blocks=in_blocks)
             require_memory(name, needed, _size_of(bound.arguments))
-            return bound, done
+            return bound, done, checked_values
 
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
             with _named_errors(name):
-                bound, done = checked(arguments, options)
+                bound, done, checked_values = checked(arguments, options)
                 if not in_blocks:
                     announce_loading(name, bound.arguments)
-                result = function(*bound.args, **bound.kwargs)
+                first = (checked_values,) if hands_on else ()
+                result = function(*first, *bound.args, **bound.kwargs)
             _warn_unconverged(name, result)
             completeness = result.attrs.pop("completeness", None)
             entries: dict[str, Any] = {"title": title, "references": references} | result.attrs

@@ -39,7 +39,9 @@ class Quantity:
         return {"long_name": self.long_name} | units | self.attributes
 
 
-STEEP = 0.3  # rms slope beyond which strains, half of it in flattened asperities, are not small
+# rms slope beyond which strains are not small: the shear strain under a flattened wave is up to its slope
+# over e (1 - nu), about half of it
+STEEP = 0.3
 # exponents with which surfaces are made; the circulant embedding is positive at .001 and .999 as well, where
 # heights are nearly white noise, or a plane
 HURST_RANGE: dict[str, Any] = {"at_least": 0.01, "at_most": 0.99}
@@ -606,15 +608,15 @@ def _label_variable(name: str, variable: xr.Variable, kept: tuple[str, ...], *, 
     if name not in QUANTITIES:
         where = "`public_result(quantities=...)` of its function, or `base/schema.py`"
         raise KeyError(f"variable {name!r} has no unit: give it a Quantity in {where}")
-    quantity, given = QUANTITIES[name], variable.attrs
+    quantity, stated = QUANTITIES[name], variable.attrs
     attributes = quantity.labels.copy()
-    if name in CORE_DIMS and "period" in given:
-        attributes["period"] = float(given["period"])
-    if kept and given.get("units") == "1":
+    if name in CORE_DIMS and "period" in stated:
+        attributes["period"] = float(stated["period"])
+    if kept and stated.get("units") == "1":
         attributes |= in_cells(name)
-    if kept and given.get("units") in quantity.other_units:
-        attributes["units"] = given["units"]
-    variable.attrs = attributes | {key: given[key] for key in kept if key in given}
+    if kept and stated.get("units") in quantity.other_units:
+        attributes["units"] = stated["units"]
+    variable.attrs = attributes | {key: stated[key] for key in kept if key in stated}
     variable.encoding = _encoding(variable, is_coordinate=is_coordinate)
 
 

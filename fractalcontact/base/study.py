@@ -35,7 +35,7 @@ def of_member(tree: xr.DataTree, number: int) -> xr.DataTree:
     return member_tree
 
 
-PAPER = (
+BORRI_BRUNETTO_1998 = (
     "Borri-Brunetto, Carpinteri and Chiaia, Contact, closure and friction behaviour of rough crack concrete "
     "surfaces, FRAMCOS-3 (1998)"
 )

@@ -1,3 +1,4 @@
+from . import solver as solver
 from ._flat_block import flat_stiffness as flat_stiffness
 from ._modulus import effective_modulus as effective_modulus
 from ._modulus import effective_poisson as effective_poisson

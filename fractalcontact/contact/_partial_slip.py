@@ -12,26 +12,29 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.compass import check_direction, read_direction
-from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.grid import Grid
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact import solver
-from fractalcontact.contact._problem import ContactOptions, LoadPath, check_problem
+from fractalcontact.contact._problem import ContactProblem, check_problem
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> tuple[ContactProblem, solver.ShearPath] | None:
     given = problems.given
     problems.number("poisson", above=-1, at_most=0.5)
     solver.check_shear(problems)
     check_direction(problems)
-    load = check_problem(problems, method="fast")
-    if load is not None and solver.check_one_load(problems, load):
-        friction, poisson = given.friction_coefficient, given.poisson
-        path = solver.ShearPath.read(given.tangential_force, given.direction, friction, poisson, given.method)
-        normal_force = load.solver_values(read_grid(given.surface).nominal_area)[1]
+    problem = check_problem(problems, method="fast")
+    if problem is None or problems.messages:
+        return None
+    friction, poisson = given.friction_coefficient, given.poisson
+    path = solver.ShearPath.read(given.tangential_force, given.direction, friction, poisson, given.method)
+    if problem.load.control != "closure":
+        normal_force = problem.load.solver_values(problem.grid.nominal_area)[1]
         solver.check_sliding(problems, path, float(normal_force[0]))
+    return problem, path
 
 
 @public_result(
@@ -40,7 +43,10 @@ def _check(problems: Problems) -> None:
     check=_check,
     memory=320.0,  # of a free body with both directions; a periodic one takes 176
 )
+@takes_checked
 def partial_slip(
+    checked: tuple[ContactProblem, solver.ShearPath],
+    /,
     surface: xr.DataArray,
     *,
     contact_modulus: float,
@@ -135,17 +141,11 @@ def partial_slip(
     >>> round(float(slipping["stick_area"][0] / slipping["contact_area"]), 2), round(0.5 ** (2 / 3), 2)
     (0.63, 0.63)
     """
-    options = ContactOptions(boundary, influence, disc_radius, None, tolerance, "fast")
-    load = LoadPath.among(
-        {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    )
-    grid = read_grid(surface)
-    path = solver.ShearPath.read(tangential_force, direction, friction_coefficient, poisson, method)
-    heights = np.asarray(surface.values, dtype=np.float64)
-    problem = (grid, float(contact_modulus), options, load)
+    problem, path = checked
+    grid, heights = problem.grid, np.asarray(surface.values, dtype=np.float64)
     sheared = solver.solve_shear(heights, *problem, path, keep=word_tuple(keep), progress=progress)
     result = _dataset(surface, grid, sheared).assign(
-        contact_modulus=float(contact_modulus),
+        contact_modulus=problem.contact_modulus,
         poisson=path.poisson,
         friction_coefficient=path.friction,
         superposition_error=sheared.superposition_error,
@@ -159,7 +159,8 @@ def partial_slip(
     if sheared.method == "superposition":
         solver.warn_lay("fractalcontact.contact.partial_slip: the contact", sheared.superposition_error)
     residual = float(np.fmax.reduce(result["residual"].values))
-    stated = {"method": sheared.method, **options.stated_on(grid), "solver": sheared.normal.solution.solver}
+    stated = {"method": sheared.method, **problem.options.stated_on(grid)}
+    stated["solver"] = sheared.normal.solution.solver
     result.attrs.update(stated, achieved_residual=residual)
     return result
 

@@ -8,16 +8,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import SHARE, Plane, in_bands, limit, thread_count
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import CONTACT_MAPS, DEFAULT_TOLERANCE, STOP_REASONS
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.contact import solver
-from fractalcontact.contact._problem import CONTROLS, ContactOptions, LoadPath, check_problem, is_periodic
+from fractalcontact.contact._problem import CONTROLS, ContactProblem, check_problem, is_periodic
 
 UNDETERMINED = (
     "normal_force", "nominal_pressure", "elastic_energy", "residual", "pressure", "displacement",
@@ -30,12 +29,13 @@ NO_STIFFNESS = (
 )
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> ContactProblem | None:
     problems.choices("keep", among=CONTACT_MAPS, optional=True)
     problems.choices("include", among=INCLUDE)
-    check_problem(problems, leading=True)
+    problem = check_problem(problems, leading=True)
     dims = getattr(problems.given.surface, "dims", ())
     problems.require("step" not in dims, "surface.dims", "no dim step, along which the loads are", dims)
+    return problem
 
 
 def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
@@ -53,7 +53,10 @@ def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
     check=_check,
     memory=_memory,
 )
+@takes_checked
 def press(
+    problem: ContactProblem,
+    /,
     surface: xr.DataArray,
     *,
     contact_modulus: float,
@@ -147,22 +150,17 @@ def press(
     >>> round(float(pressed["normal_force"][0]) / (4 / 3 * 1e9 * 2e-6**1.5), 3)
     1.0
     """
-    options = ContactOptions(boundary, influence, disc_radius, hardness, tolerance, method)
-    load = LoadPath.among(
-        {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    )
-    grid = read_grid(surface)
+    grid, options = problem.grid, problem.options
     heights = np.asarray(surface.values, dtype=np.float64)
     names, further = word_tuple(keep), word_tuple(include)
 
     def pressed(plane: Array, progress: bool) -> solver.Pressed:
-        problem = (grid, float(contact_modulus), options, load)
         return solver.solve(plane, *problem, keep=names, include=further, progress=progress)
 
     stack = heights.reshape(-1, *grid.shape)
     planes = _pressed_planes(stack, pressed, progress)
     slopes = [solver.rms_slope(plane, grid) for plane in stack]
-    result = _dataset(surface, grid, float(contact_modulus), load, planes, slopes)
+    result = _dataset(surface, problem, planes, slopes)
     _add_reasons(result)
     solver.warn_steep("fractalcontact.contact.press: the surface", max(slopes))
     # `public_result` moves these attributes into the provenance of the result; it sets `run_time` only where
@@ -206,13 +204,12 @@ def _pressed_planes(
 
 def _dataset(
     surface: xr.DataArray,
-    grid: Grid,
-    contact_modulus: float,
-    load: LoadPath,
+    problem: ContactProblem,
     planes: Sequence[solver.Pressed],
     slopes: Sequence[float],
 ) -> xr.Dataset:
     """Return the Dataset over all planes and steps."""
+    grid, load = problem.grid, problem.load
     leading, lengths, steps = surface.dims[:-2], surface.shape[:-2], len(load.values)
     variables: dict[str, Any] = {}
     for name in planes[0].columns:
@@ -228,7 +225,7 @@ def _dataset(
     if "area_share" in variables:
         coords["pressure_class"] = (np.arange(solver.PRESSURE_CLASSES) + 0.5) / solver.PRESSURE_CLASSES
     variables["nominal_area"] = grid.nominal_area
-    variables["contact_modulus"] = contact_modulus
+    variables["contact_modulus"] = problem.contact_modulus
     variables["rms_slope"] = (leading, np.array(slopes).reshape(lengths))
     if planes[0].disc_radius is not None:
         variables["disc_radius"] = planes[0].disc_radius

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fractalcontact.base.grid import UNIFORM, Grid, read_grid
 from fractalcontact.base.numbers import Array, float_array, power_of_two
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
-from fractalcontact.base.study import PAPER, joined_references
+from fractalcontact.base.study import BORRI_BRUNETTO_1998, joined_references
 from fractalcontact.base.validation import Problems, given_option
 from fractalcontact.contact import _influence
 from fractalcontact.contact._operator import (
@@ -36,10 +36,10 @@ CONTROL_UNITS = {"closure": "m", "normal_force": "N", "nominal_pressure": "Pa"}
 CONTROLS = tuple(CONTROL_UNITS)
 SOLVER_SOURCES = {
     "fast": "Polonsky and Keer, Wear 231:206 (1999); Bugnicourt et al., Tribol. Lett. 66:29 (2018)",
-    "elimination": PAPER,
+    "elimination": BORRI_BRUNETTO_1998,
 }
 INFLUENCE_SOURCES = {
-    "disc": PAPER,
+    "disc": BORRI_BRUNETTO_1998,
     "square": "Love, Phil. Trans. R. Soc. A 228:377 (1929)",
     "spectral": "Stanley and Kato, J. Tribol. 119:481 (1997)",
 }
@@ -210,34 +210,42 @@ def is_periodic(boundary: str | None, wraps: bool) -> bool:
     return wraps if boundary is None else boundary == "periodic"
 
 
-def check_problem(problems: Problems, *, leading: bool = False, **replaced: Any) -> LoadPath | None:
-    """Check surface, modulus, load and options of a contact problem; return the load unless it is wrong.
+class ContactProblem(NamedTuple):
+    """A contact problem in SI units but for its heights, as `solver.solve` takes it."""
 
-    They are the arguments of the call, or what replaces these.
-    """
-    arguments = vars(problems.given) | replaced
-    surface, contact_modulus = arguments["surface"], arguments["contact_modulus"]
+    grid: Grid
+    contact_modulus: float
+    options: ContactOptions
+    load: LoadPath
+
+
+def check_problem(problems: Problems, *, leading: bool = False, **replaced: Any) -> ContactProblem | None:
+    """Check surface, modulus, load and options of a call, or what replaces them; return them if valid."""
+    given, arguments = problems.given, vars(problems.given) | replaced
+    problems.boolean("progress")
     surface_is_valid = problems.surface("surface", leading=leading)
     problems.number("contact_modulus", above=0)
     options = problems.construct(ContactOptions.among, arguments)
     load = problems.construct(LoadPath.among, arguments)
     if not surface_is_valid or options is None:
-        return load
-    grid = read_grid(surface)
+        return None
+    grid = read_grid(given.surface)
     options.check_grid(grid, problems)
     if load is None or problems.messages:
-        return load
-    ranges = np.ptp(np.asarray(surface.values, np.float64).reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
+        return None
+    problem = ContactProblem(grid, float(given.contact_modulus), options, load)
+    heights = np.asarray(given.surface.values, np.float64)
+    ranges = np.ptp(heights.reshape(-1, grid.shape[0] * grid.shape[1]), axis=1)
     for height_range in {float(ranges.min()), float(ranges.max())}:
-        check_scale(problems, grid, height_range, float(contact_modulus), options, load)
+        check_scale(problems, height_range, *problem)
     options.check_load(load, grid.nominal_area, problems)
-    return load
+    return problem
 
 
 def check_scale(
     problems: Problems,
-    grid: Grid,
     height_range: float,
+    grid: Grid,
     contact_modulus: float,
     options: ContactOptions,
     load: LoadPath,
@@ -271,9 +279,9 @@ def check_scale(
     scale = unit / (grid.nominal_area if load.control == "nominal_pressure" else 1.0)
     low, high, unit_name = scale / greatest_ratio, scale * greatest_ratio, CONTROL_UNITS[load.control]
     expected = f"0 or between {low:.3g} and {high:.3g} {unit_name} for this surface and modulus"
-    for given, value in zip(load.values, values, strict=True):
+    for imposed, value in zip(load.values, values, strict=True):
         in_range = value == 0 or unit / greatest_ratio < value < unit * greatest_ratio
-        problems.require(in_range, load.control, expected, f"{given:g} {unit_name}")
+        problems.require(in_range, load.control, expected, f"{imposed:g} {unit_name}")
     return len(problems.messages) == before
 
 
@@ -382,7 +390,7 @@ class Solution:
 
 @lru_cache(maxsize=KEPT)
 def kept_operator(body: Body) -> HalfSpaceOperator:
-    """Return the operator of a small free body; its table takes as long as a solution."""
+    """Return the operator of a small free body, see `SMALL`."""
     return HalfSpaceOperator(body.influence_table())
 
 

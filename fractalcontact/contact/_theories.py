@@ -49,7 +49,7 @@ def _check(problems: Problems) -> None:
     if surface_is_valid and modulus_is_valid and load is not None and not problems.messages:
         height_range = float(given.surface.values.max()) - float(given.surface.values.min())
         grid, modulus = read_grid(given.surface), float(given.contact_modulus)
-        check_scale(problems, grid, height_range, modulus, ContactOptions(), load)
+        check_scale(problems, height_range, grid, modulus, ContactOptions(), load)
 
 
 @public_result(

@@ -43,8 +43,9 @@ CLOSURE_MARGIN = 1.1
 class PastStep(NamedTuple):
     """A step that has been solved: what was imposed, and the scaled solution.
 
-    `state` is the pressure less the gap over the compliance of a node by itself: positive in contact, beyond
-    the largest pressure where a node yields, and the more negative the wider a node is open.
+    Pressure p and gap g are in one array, `state` = p - g/c with the compliance c of a node by itself. As
+    p g = 0, it is the pressure in contact, and -g/c at an open node, which closes where a line through the
+    states of two steps crosses zero. Where a node yields the overlap (g < 0) adds to the largest pressure.
     """
 
     control: float

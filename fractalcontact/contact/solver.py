@@ -23,13 +23,13 @@ import numpy as np
 
 from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning, warn
 from fractalcontact.base.grid import EXCESS_PER_EDGE, Grid, contact_edges
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, number_of_entries
 from fractalcontact.base.schema import CONTACT, OPEN, SLIP_MAPS, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems
 from fractalcontact.contact._flat_block import block_stiffness as block_stiffness
 from fractalcontact.contact._load_path import Step, press_punch, scaled_path, solve_path
-from fractalcontact.contact._problem import FORCE_ROUNDING
+from fractalcontact.contact._problem import CONTROLS, FORCE_ROUNDING
 from fractalcontact.contact._problem import ContactOptions as ContactOptions
 from fractalcontact.contact._problem import LoadPath as LoadPath
 from fractalcontact.contact._problem import check_scale as check_scale
@@ -314,19 +314,16 @@ def _solve_fully(
 
 
 def check_shear(problems: Problems, *, has_friction: bool = False) -> None:
-    """Check friction, tangential forces, method and maps; `has_friction`: the bodies have a coefficient."""
+    """Check loads, friction, method and maps of a shear; `has_friction`: the bodies have a coefficient."""
+    expected = "one number: the normal load is constant while the tangential force changes"
+    for name in CONTROLS:
+        count = number_of_entries(getattr(problems.given, name)) or 1
+        problems.require(count == 1, name, expected, f"{count} of them")
     # at most beyond that of any pair of bodies
     problems.number("friction_coefficient", above=0, at_most=1e3, optional=has_friction)
     problems.numbers("tangential_force")
     problems.choice("method", among=METHODS, optional=True)
     problems.choices("keep", among=SLIP_MAPS)
-
-
-def check_one_load(problems: Problems, load: LoadPath) -> bool:
-    """Check that the load of a sheared contact is one number; return whether its force is known and valid."""
-    expected = "one number: the normal load is constant while the tangential force changes"
-    problems.require(len(load.values) == 1, load.control, expected, f"{len(load.values)} of them")
-    return not problems.messages and load.control != "closure"
 
 
 def check_sliding(problems: Problems, shear: ShearPath, normal_force: float) -> bool:

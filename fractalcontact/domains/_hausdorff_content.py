@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import DECADES, EXCESS_PER_EDGE, contact_edges
+from fractalcontact.base.grid import DECADES, EXCESS_PER_EDGE, UNIFORM, contact_edges
 from fractalcontact.base.numbers import ROUNDED, float_array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
@@ -29,7 +29,6 @@ SOURCE = (
     "Mattila, Geometry of Sets and Measures in Euclidean Spaces (1995), ch. 4 and 8 (content, Frostman's "
     "lemma); Carpinteri, Mech. Mater. 18:89 (1994) (renormalised measure)"
 )
-SQUARE = 1e-6  # largest difference of the two spacings of square cells, relative
 
 
 def _check(problems: Problems) -> None:
@@ -39,7 +38,7 @@ def _check(problems: Problems) -> None:
     is_length = problems.number("coarsest", above=0.0, at_most=10.0**DECADES, optional=True)
     if _masks.check_mask(problems):
         dy, dx = _masks.mask_grid(given.mask).spacing
-        is_square = abs(dy - dx) <= SQUARE * dx
+        is_square = abs(dy - dx) <= UNIFORM * dx
         problems.require(is_square, "mask", "square cells", f"spacings {dy:g} and {dx:g} m")
         finest = min(dy, dx)
         if is_length and given.coarsest is not None:
@@ -187,6 +186,7 @@ EXPONENTS = np.linspace(0.5, 2.0, 61)  # between which that of the stationary co
 
 def _check_masks(problems: Problems) -> None:
     given = problems.given
+    problems.boolean("corrected")
     is_list = isinstance(given.masks, (list, tuple)) and len(given.masks) > 1
     if not problems.require(is_list, "masks", "a list of two masks or more"):
         return
@@ -300,8 +300,8 @@ def stationary_exponents(stacks: Sequence[Planes]) -> Array:
     """
     sides = np.array([planes.side for planes in stacks])
     doublings = np.log2(sides / sides[0])
-    are_square = all(abs(dy - dx) <= SQUARE * dx for dy, dx in (planes.grid.spacing for planes in stacks))
-    if not are_square or np.abs(doublings - np.rint(doublings)).max() > SQUARE:
+    are_square = all(abs(dy - dx) <= UNIFORM * dx for dy, dx in (planes.grid.spacing for planes in stacks))
+    if not are_square or np.abs(doublings - np.rint(doublings)).max() > UNIFORM:
         return np.full(stacks[0].count, np.nan)
     levels = int(np.ceil(np.log2(max(stacks[0].grid.shape))))
     shifts = 4  # of the grid of squares: exponents are within .008 of those of 16, with one within .020

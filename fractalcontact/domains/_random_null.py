@@ -105,11 +105,11 @@ def aligned(n: int, first: int, second: int) -> Pairs:
     start = np.union1d(np.arange(0, n, first), np.arange(0, n, second))  # of the part in one box of each
     shared = np.diff(start, append=n)
     a, b = (np.minimum(size, n - start // size * size) for size in (first, second))
-    of_one, of_other = ([(size, n // size), (n % size, int(n % size > 0))] for size in (first, second))
+    of_first, of_second = ([(size, n // size), (n % size, int(n % size > 0))] for size in (first, second))
     counts = Counter(zip(a.tolist(), b.tolist(), shared.tolist(), strict=True))
-    for (one, boxes), (other, others) in itertools.product(of_one, of_other):
-        if boxes * others > 0:
-            counts[one, other, 0] = boxes * others - int(np.sum((a == one) & (b == other)))
+    for (a_cells, a_boxes), (b_cells, b_boxes) in itertools.product(of_first, of_second):
+        if a_boxes * b_boxes > 0:
+            counts[a_cells, b_cells, 0] = a_boxes * b_boxes - int(np.sum((a == a_cells) & (b == b_cells)))
     *pairs, number = np.array([(*pair, number) for pair, number in counts.items()]).T
     return (*pairs, number.astype(float))
 
@@ -200,8 +200,8 @@ class PairsInGaps:
 
 def _overlapping(a: Array, b: Array, shared: Array, number: Array) -> Pairs:
     pairs = np.broadcast_arrays(a, b, shared, number)
-    one, other, both, times = (values[pairs[2] > 0] for values in pairs)
-    return one, other, both, times
+    a, b, shared, number = (values[pairs[2] > 0] for values in pairs)
+    return a, b, shared, number
 
 
 def dimension_deviation(
@@ -216,10 +216,10 @@ def dimension_deviation(
     expected = counts[knots]
     variances, axes = np.linalg.eigh(covariance / np.multiply.outer(expected, expected))
     deviations = axes.T * np.sqrt(np.maximum(variances, 0.0))[:, None]
-    found, differences = dimension(counts), []
+    undisturbed, differences = dimension(counts), []
     for deviation in deviations:
         ratio = np.exp(np.interp(np.log(sizes), np.log(sizes[knots]), deviation))
-        differences.append(dimension(counts * ratio) - found)
+        differences.append(dimension(counts * ratio) - undisturbed)
     return float(np.linalg.norm(differences))
 
 

@@ -25,6 +25,7 @@ def _check(problems: Problems) -> None:
         size = float_array(given.spacing).size
         problems.require(size in (1, 2), "spacing", "one number or (y, x)", f"{size} numbers")
     problems.number("threshold", optional=True)
+    problems.boolean("dark")
 
 
 @public_result(

@@ -13,20 +13,21 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
-from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, check_pressing, pressed_dataset
+from fractalcontact.joints._sheared_contact import PRESS_BYTES, JointProblem, check_problem, closure_dataset
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> JointProblem | None:
     crack, factors = problems.given.crack, problems.given.factors
     check_sliding(problems, single=True)
-    check_pressing(problems)
+    problem = check_problem(problems)
     if problems.numbers("factors", at_least=1, optional=True) and isinstance(crack, Crack):
         _check_factors(problems, crack.layout.cells, factors)
+    return problem
 
 
 def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> None:
@@ -44,8 +45,11 @@ def _check_factors(problems: Problems, cells: tuple[int, int], factors: Any) -> 
         problems.require(several and bool(valid.all()) and all(divides), "factors", expected, factors)
 
 
-@public_result(title="contact area of a crack by spacing", check=_check, memory=PRESSING_BYTES)
+@public_result(title="contact area of a crack by spacing", check=_check, memory=PRESS_BYTES)
+@takes_checked
 def area_by_resolution(
+    problem: JointProblem,
+    /,
     crack: Crack,
     *,
     shear: float | Sequence[float] | Array,
@@ -113,22 +117,18 @@ def area_by_resolution(
     [[[5.0, 6.3, 9.8]]]
     """
     towards, shears = read_direction(direction), float_array(shear)
-    loads = {"normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    pressing = Pressing.read(
-        crack, loads, influence=influence, hardness=hardness, tolerance=tolerance, keep=("state",)
-    )
     used = default_factors(crack.layout.cells) if factors is None else float_array(factors).astype(int)
     pressed = []
     for factor in np.sort(used):
-        coarser = replace(pressing, factor=int(factor))
-        pressed.append(pressed_dataset(coarser, shears, [towards]).isel(direction=0))
+        coarser = replace(problem, factor=int(factor), keep=("state",))
+        pressed.append(closure_dataset(coarser, shears, [towards]).isel(direction=0))
     areas = fc.domains.area_dimension([each["state"] for each in pressed])
     result = areas.drop_vars(("run_time", "closure")).drop_attrs(deep=False)
     for name in ("interface_closure", "residual", "converged"):
         values = np.stack([each[name].values for each in pressed], axis=-1)
         result[name] = ("shear", "step", "resolution"), values
     result["nominal_area"] = crack.nominal_area
-    references = joined_references(pressing.references, areas.attrs["references"])
+    references = joined_references(problem.references, areas.attrs["references"])
     residual = max(each.attrs["achieved_residual"] for each in pressed)
     return result.assign_attrs(achieved_residual=residual, references=references)
 

@@ -11,14 +11,14 @@ import xarray as xr
 
 from fractalcontact.base.compass import is_single, read_directions
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import CLOSURE_FITS, POSITIVE, check_quantities
 from fractalcontact.joints._delta_surface import interpolation_errors
-from fractalcontact.joints._sheared_contact import PRESSING_BYTES, Pressing, check_pressing, pressed_dataset
+from fractalcontact.joints._sheared_contact import PRESS_BYTES, JointProblem, check_problem, closure_dataset
 
 Path = float | Sequence[float] | Array
 
@@ -29,18 +29,22 @@ UNDETERMINED = (
 )
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> JointProblem | None:
+    problems.boolean("progress")
     check_sliding(problems)
-    check_pressing(problems)
+    return check_problem(problems)
 
 
 @public_result(
     title="closure of a sheared crack",
     reasons=dict.fromkeys(OF_FORCES, UNDETERMINED),
     check=_check,
-    memory=PRESSING_BYTES,
+    memory=PRESS_BYTES,
 )
+@takes_checked
 def closure(
+    problem: JointProblem,
+    /,
     crack: Crack,
     *,
     shear: Path,
@@ -111,19 +115,7 @@ def closure(
     [[0.0, 0.0], [2.2, 5.2]]
     """
     directions, shears = read_directions(direction), float_array(shear)
-    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    pressing = Pressing.read(
-        crack,
-        loads,
-        bulk=bulk,
-        keep=keep,
-        influence=influence,
-        disc_radius=disc_radius,
-        hardness=hardness,
-        tolerance=tolerance,
-        method=method,
-    )
-    result = pressed_dataset(pressing, shears, directions, progress)
+    result = closure_dataset(problem, shears, directions, progress)
     result["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
     return result.isel(direction=0) if is_single(direction) else result
 

@@ -23,7 +23,7 @@ from fractalcontact.base.compass import (
 from fractalcontact.base.numbers import ROUNDED, Array, float_array
 from fractalcontact.base.regression import detrended, rounding_of
 from fractalcontact.base.results import public_result
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_crack, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, missing_heights
@@ -56,7 +56,7 @@ def _check(problems: Problems) -> None:
 
 @public_result(
     title="correlation of the faces of a sheared crack",
-    references=f"{PAPER}; Künsch, Ann. Stat. 17:1217 (1989) (jackknife)",
+    references=f"{BORRI_BRUNETTO_1998}; Künsch, Ann. Stat. 17:1217 (1989) (jackknife)",
     check=_check,
 )
 def decorrelation_length(
@@ -127,8 +127,8 @@ def decorrelation_length(
         coords={"shear": ("shear", shears), **direction_coords(directions)},
         attrs={"correlation_threshold": THRESHOLD},
     )
-    found = zip(directions, (row["missing_reason"] for row in rows), strict=True)
-    reasons = [f"{towards.name}: {reason}" for towards, reason in found if reason]
+    missing = zip(directions, (row["missing_reason"] for row in rows), strict=True)
+    reasons = [f"{towards.name}: {reason}" for towards, reason in missing if reason]
     for name in ("decorrelation_length", "decorrelation_length_low", "decorrelation_length_high"):
         if reasons and bool(result[name].isnull().any()):
             result[name].attrs["reason"] = f"NaN: {'; '.join(reasons)}"

@@ -28,14 +28,14 @@ from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import Array, float_array, is_within
 from fractalcontact.base.regression import fitted_slope, rounding_of
 from fractalcontact.base.results import public_result
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems, Words, require
 from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords, check_sliding
 
 DEGREE = 5  # of the spline; 3 and 7 change the heights of a fractal face by 2 and 1 % of their greatest
 
 
-@public_result(title="delta-surface of a sheared crack", references=PAPER, check=check_sliding)
+@public_result(title="delta-surface of a sheared crack", references=BORRI_BRUNETTO_1998, check=check_sliding)
 def delta_surface(
     crack: Crack, shear: float | Sequence[float] | Array, direction: str | float | Sequence[str | float] = "E"
 ) -> xr.DataArray:
@@ -266,7 +266,7 @@ def _check_window(problems: Problems) -> None:
 
 @public_result(
     title="dimension of the delta-surface",
-    references=PAPER,
+    references=BORRI_BRUNETTO_1998,
     achieved_error="not given: an interval of such a slope would have no stated coverage",
     reasons=dict.fromkeys(("variogram_dimension", "spectrum_dimension"), FLAT),
     check=_check_window,

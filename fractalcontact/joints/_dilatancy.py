@@ -10,38 +10,42 @@ import xarray as xr
 from fractalcontact.base.compass import COMPASS, Direction, direction_coords, read_directions
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import slopes
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
 from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._sheared_contact import (
     CONTACT_OPTIONS,
-    PRESSING_BYTES,
-    Pressing,
+    PRESS_BYTES,
+    JointProblem,
     Spring,
-    check_pressing,
+    check_problem,
     check_unpressed,
-    pressed_dataset,
+    closure_dataset,
 )
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> JointProblem | None:
     given = problems.given
+    problems.boolean("progress")
     check_sliding(problems)
     if given.normal_force is None:
         unused = ("normal_stiffness", "pressed", "bulk", "keep", *CONTACT_OPTIONS)
         check_unpressed(problems, dilatancy, unused)
-        return
+        return None
     one_of = given.normal_stiffness is None or given.pressed is None
     problems.require(one_of, "pressed", "nothing beside `normal_stiffness`")
     problems.number("normal_stiffness", above=0, optional=True)
-    check_pressing(problems)
+    return check_problem(problems)
 
 
-@public_result(title="dilatancy of a crack", references=PAPER, check=_check, memory=PRESSING_BYTES)
+@public_result(title="dilatancy of a crack", references=BORRI_BRUNETTO_1998, check=_check, memory=PRESS_BYTES)
+@takes_checked
 def dilatancy(
+    problem: JointProblem | None,
+    /,
     crack: Crack,
     *,
     shear: float | Sequence[float] | Array,
@@ -116,23 +120,12 @@ def dilatancy(
     """
     directions, shears = read_directions(direction), float_array(shear)
     rigid = _rigid_dataset(crack, shears, directions)
-    if normal_force is None:
+    if problem is None:
         return rigid
-    load, spring = {"normal_force": normal_force}, None
-    pressing = Pressing.read(
-        crack,
-        load,
-        bulk=bulk,
-        keep=keep,
-        influence=influence,
-        disc_radius=disc_radius,
-        hardness=hardness,
-        tolerance=tolerance,
-        method=method,
-    )
+    spring = None
     if normal_stiffness is not None:
         spring = Spring(rigid["rigid_dilatancy"].values, normal_stiffness * crack.nominal_area)
-    under_force = pressed_dataset(pressing, shears, directions, progress, pressed=pressed, spring=spring)
+    under_force = closure_dataset(problem, shears, directions, progress, pressed=pressed, spring=spring)
     under_force = under_force.reset_coords("closure").drop_vars(("contact_area", "run_time"))
     result = under_force.merge(rigid, compat="override", combine_attrs="override")
     result["dilatancy"] = result["rigid_dilatancy"] - result["interface_closure"]
@@ -140,7 +133,7 @@ def dilatancy(
         result["bulk_closure"] = result["bulk_closure"].isel(direction=0, shear=0, drop=True)
     else:
         result = result.assign(normal_stiffness=float(normal_stiffness))
-        result["initial_force"] = "step", float_array(pressing.load.values)
+        result["initial_force"] = "step", float_array(problem.load.values)
     return result
 
 

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+import fractalcontact as fc
 from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import ROUNDED, Array, float_array
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems, word_tuple
@@ -23,7 +24,7 @@ from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._delta_surface import heights_under
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
-from fractalcontact.joints._sheared_contact import Pressing, ShearedContact, check_pressing
+from fractalcontact.joints._sheared_contact import JointProblem, ShearedContact, check_problem
 
 WHERE = "fractalcontact.joints.direct_shear"
 FIRST = "NaN before the first step"
@@ -37,8 +38,9 @@ MAPS = ("residual_lower", "residual_upper")
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> JointProblem | None:
     given = problems.given
+    problems.boolean("progress")
     problems.number("normal_stiffness", **POSITIVE, optional=True)
     problems.number("shear_stiffness", **POSITIVE, optional=True)
     problems.number("distance", above=0, optional=True)
@@ -51,10 +53,12 @@ def _check(problems: Problems) -> None:
         problems.require(bounded, "nominal_pressure", "less than the hardness", greatest)
     check_crack(problems)
     hardness = given.hardness if hardness_is_valid else None  # what is wrong has been noted
-    check_pressing(problems, hardness=hardness, nominal_pressure=given.nominal_pressure if has_load else 0.0)
+    load = given.nominal_pressure if has_load else 0.0
+    problem = check_problem(problems, hardness=hardness, nominal_pressure=load)
     path_is_valid = problems.numbers("path", at_least=-POSITIVE["at_most"], at_most=POSITIVE["at_most"])
     if check_direction(problems) and path_is_valid and isinstance(given.crack, Crack):
         _check_path(problems, given.crack, _turning_points(given.path), read_direction(given.direction))
+    return problem
 
 
 def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards: Direction) -> None:
@@ -65,9 +69,9 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
         problems.add("direction", expected, towards.name)
         return
     cells = turning_points / step
-    whole = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
+    on_grid = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
     expected = f"multiples of {step:g} m, the cells along {towards.name}: wear stays on the grid"
-    if problems.require(whole, "path", expected, turning_points.tolist()):
+    if problems.require(on_grid, "path", expected, turning_points.tolist()):
         moves = bool((np.diff(np.rint(cells)) != 0).all())
         problems.require(
             moves, "path", "positions other than the one before, the first not 0", turning_points
@@ -89,7 +93,10 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
     },
     check=_check,
 )
+@takes_checked
 def direct_shear(
+    problem: JointProblem,
+    /,
     crack: Crack,
     path: float | Sequence[float] | Array,
     *,
@@ -172,19 +179,10 @@ def direct_shear(
     step = _cell_step(crack, towards)
     assert step is not None
     legs = _legs(_turning_points(path), step)
-    load = {"nominal_pressure": nominal_pressure}
-    pressing = Pressing.read(
-        crack,
-        load,
-        influence=influence,
-        disc_radius=disc_radius,
-        hardness=hardness,
-        tolerance=tolerance,
-    )
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
     spring = 0.0 if normal_stiffness is None else float(normal_stiffness) * area
-    joints = [WornJoint(pressing, towards) for _ in pressures]
+    joints = [WornJoint(problem, towards) for _ in pressures]
     for joint, pressure in zip(joints, pressures, strict=True):
         _test(joint, legs, float(pressure) * area, spring, progress)
     length = max(PEAK_SHARE * math.sqrt(area), 2 * step) if distance is None else float(distance)
@@ -197,16 +195,14 @@ def direct_shear(
             result = result.assign_coords(coords)
     residual = max(joint.residual for joint in joints)
     _warn(joints)
-    references = joined_references(PATTON, pressing.references)
+    references = joined_references(PATTON, problem.references)
     return result.assign_attrs(references=references, achieved_residual=residual)
 
 
 def _warn(joints: Sequence[WornJoint]) -> None:
     """Warn of presses that did not converge, and of slopes beyond small strains."""
-    from fractalcontact.contact.solver import warn_steep
-
     steepest = max(joint.steepest for joint in joints)
-    warn_steep(f"{WHERE}: the delta-surface", steepest)
+    fc.contact.solver.warn_steep(f"{WHERE}: the delta-surface", steepest)
     failed = sum(joint.unconverged for joint in joints)
     if failed:
         message = f"{WHERE}: the solver did not converge {failed} times; see the achieved residual"
@@ -322,15 +318,15 @@ def _peaks(positions: Array, columns: dict[str, Array], length: float) -> dict[s
         work[:, 1:] = np.cumsum(stress[:, 1:] * np.diff(slip), axis=1)
         means.append(secant_slopes(slip, work.T, np.array([length]))[0])  # (point, test)
     shear, normal = means
-    known = np.isfinite(shear)  # not where the window would end beyond the leg, or the joint was crushed
-    peak = np.where(known, shear, -np.inf).max(axis=0)
-    ratio = np.where(known, shear / normal, -np.inf).max(axis=0)
-    last = known.shape[0] - 1 - known[::-1].argmax(axis=0)
-    any_known = known.any(axis=0)
+    is_known = np.isfinite(shear)  # not where the window would end beyond the leg, or the joint was crushed
+    peak = np.where(is_known, shear, -np.inf).max(axis=0)
+    ratio = np.where(is_known, shear / normal, -np.inf).max(axis=0)
+    last = is_known.shape[0] - 1 - is_known[::-1].argmax(axis=0)
+    has_mean = is_known.any(axis=0)
     return {
-        "peak_shear_strength": np.where(any_known, peak, np.nan),
-        "peak_friction_angle": np.where(any_known, np.degrees(np.arctan(ratio)), np.nan),
-        "residual_shear_strength": np.where(any_known, shear[last, np.arange(last.size)], np.nan),
+        "peak_shear_strength": np.where(has_mean, peak, np.nan),
+        "peak_friction_angle": np.where(has_mean, np.degrees(np.arctan(ratio)), np.nan),
+        "residual_shear_strength": np.where(has_mean, shear[last, np.arange(last.size)], np.nan),
     }
 
 
@@ -365,10 +361,10 @@ class ShearStep(NamedTuple):
 class WornJoint:
     """A crack with the wear of both its faces, which grows as it is pressed."""
 
-    def __init__(self, pressing: Pressing, towards: Direction) -> None:
-        crack, options = pressing.crack, pressing.options
+    def __init__(self, problem: JointProblem, towards: Direction) -> None:
+        crack, options = problem.crack, problem.options
         lower, upper = crack.faces()
-        self.crack, self.towards, self.pressing = crack, towards, pressing
+        self.crack, self.towards, self.problem = crack, towards, problem
         # just below the hardness all over; 1 - 1e-6 and 1 - 1e-12 gave the same bits
         self.capacity = float(options.hardness or math.inf) * crack.nominal_area / ROUNDED
         self.lower_wear, self.upper_wear = np.zeros(lower.shape), np.zeros(upper.shape)
@@ -382,14 +378,14 @@ class WornJoint:
         layout, (lower, upper) = self.crack.layout, self.crack.faces()
         shift = layout.shift(position, self.towards.unit)
         heights = heights_under(lower - self.lower_wear, layout, shift) - (upper + self.upper_wear)
-        pressing = self.pressing
+        problem = self.problem
         if elastic:
-            pressing = replace(pressing, options=replace(pressing.options, hardness=None))
-        return ShearedContact(pressing, heights, position, self.towards)
+            problem = replace(problem, options=replace(problem.options, hardness=None))
+        return ShearedContact(problem, heights, position, self.towards)
 
     def press(self, contact: ShearedContact, load: float) -> State:
         """Press a contact of this joint under a load, N."""
-        force = replace(self.pressing.load, control="normal_force", values=(load,))
+        force = replace(self.problem.load, control="normal_force", values=(load,))
         columns = contact.press(force, ("residual_height",))
         heights = contact.heights
         self.residual = max(self.residual, float(columns["residual"][0]))
@@ -416,10 +412,10 @@ class WornJoint:
 
     def faces(self) -> tuple[xr.DataArray, xr.DataArray]:
         """Return the whole lower and upper face as they are worn now."""
-        whole = self.crack.lower if self.crack.upper is None else self.crack.upper
-        heights = np.array(whole.values, dtype=np.float64)
+        upper = self.crack.lower if self.crack.upper is None else self.crack.upper
+        heights = np.array(upper.values, dtype=np.float64)
         heights[self.crack.layout.slices] += self.upper_wear
-        return self.crack.lower.copy(data=self.crack.faces()[0] - self.lower_wear), whole.copy(data=heights)
+        return self.crack.lower.copy(data=self.crack.faces()[0] - self.lower_wear), upper.copy(data=heights)
 
     def report(self, state: State, first: float) -> dict[str, float]:
         """Return what is reported of a state, with the height of the block at the start."""
@@ -530,7 +526,7 @@ def balanced_step(
 def _mean(first: Any, second: Any, share: float) -> Any:
     """Return the mean of two steps or of two of their numbers, the second with this share."""
     if isinstance(first, (ShearStep, State)):
-        return type(first)(*(_mean(one, other, share) for one, other in zip(first, second, strict=True)))
+        return type(first)(*(_mean(a, b, share) for a, b in zip(first, second, strict=True)))
     return first + share * (second - first)
 
 

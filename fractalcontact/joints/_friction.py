@@ -151,8 +151,8 @@ def friction(
     """
     name, shears = _dilatancy_name(dilatancy), _shears(dilatancy)
     basic_angle = float(_basic_angle(dilatancy, basic_friction_angle))
-    given = drop_unknown_coords(dilatancy[name]).drop_attrs()
-    opening = given.transpose("shear", ...)
+    curve = drop_unknown_coords(dilatancy[name]).drop_attrs()
+    opening = curve.transpose("shear", ...)
     lift = opening.copy(data=work_per_force(dilatancy, opening, form))
     result = xr.Dataset({"dilatancy_angle": _angle(opening, smoothing)})
     if form == "energy":
@@ -172,8 +172,8 @@ def friction(
     result = result.assign(_peaks(secants, pressure, length).data_vars)
     _, lengths = dilatancy_slopes(shears, np.zeros((shears.size, 1)), smoothing)
     result["basic_friction_angle"], result["smoothing"] = basic_angle, ("shear", lengths)
-    place = given.dims.index("shear")
-    order = (*given.dims[:place], "distance", *given.dims[place:])
+    place = curve.dims.index("shear")
+    order = (*curve.dims[:place], "distance", *curve.dims[place:])
     result = result.transpose(*order, ..., missing_dims="ignore").assign_attrs(slope_of=name)
     result["friction_angle"].attrs["comment"] = FORMS[form]
     _explain(result, secants)

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+import fractalcontact as fc
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.signals import track
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_sliding
-from fractalcontact.joints._sheared_contact import LOADS, Pressing, ShearedContact, check_pressing, stacked
+from fractalcontact.joints._sheared_contact import LOADS, JointProblem, ShearedContact, check_problem, stacked
 
 if TYPE_CHECKING:
     from fractalcontact.contact.solver import ShearPath
@@ -29,43 +30,38 @@ STIFFNESSES = ("tangential_stiffness", "shear_stiffness", "interface_stiffness",
 RIGID = "NaN where the interface is rigid: the faces are mated, or all of them touch"
 
 
-def _check(problems: Problems) -> None:
-    from fractalcontact.contact import solver as contact_solver
-
-    given = problems.given
+def _check(problems: Problems) -> tuple[JointProblem, ShearPath] | None:
+    given, solver = problems.given, fc.contact.solver
+    problems.boolean("progress")
     check_sliding(problems, single=True)
-    contact_solver.check_shear(problems, has_friction=True)
-    load = check_pressing(problems, method="fast")
-    if load is None or not contact_solver.check_one_load(problems, load):
-        return
-    path = _shear_path(
-        given.crack, given.tangential_force, given.direction, given.friction_coefficient, given.method
-    )
-    expected = "above 0, or a friction_coefficient"
-    if problems.require(path.friction > 0, "basic_friction_angle", expected, 0.0):
-        force = float(load.solver_values(given.crack.nominal_area)[1][0])
-        contact_solver.check_sliding(problems, path, force)
-
-
-def _shear_path(
-    crack: Crack, forces: Any, direction: Any, friction_coefficient: Any, method: str | None
-) -> ShearPath:
-    from fractalcontact.contact.solver import ShearPath
-
-    friction = friction_coefficient
+    solver.check_shear(problems, has_friction=True)
+    problem = check_problem(problems, method="fast")
+    if problem is None:
+        return None
+    crack, friction = problem.crack, given.friction_coefficient
     if friction is None:
         friction = math.tan(math.radians(crack.basic_friction_angle))
-    return ShearPath.read(forces, direction, friction, crack.contact_poisson, method)
+    law = friction, crack.contact_poisson, given.method
+    path = solver.ShearPath.read(given.tangential_force, given.direction, *law)
+    expected = "above 0, or a friction_coefficient"
+    has_friction = problems.require(path.friction > 0, "basic_friction_angle", expected, 0.0)
+    if has_friction and problem.load.control != "closure":
+        force = float(problem.load.solver_values(crack.nominal_area)[1][0])
+        solver.check_sliding(problems, path, force)
+    return problem, path
 
 
 @public_result(
     title="Partial slip of a joint",
-    references=PAPER,
+    references=BORRI_BRUNETTO_1998,
     reasons=dict.fromkeys(STIFFNESSES, RIGID),
     check=_check,
     memory=360.0,  # of a cell: both directions of a free body (320), delta-surface and flat block
 )
+@takes_checked
 def partial_slip(
+    checked: tuple[JointProblem, ShearPath],
+    /,
     crack: Crack,
     *,
     shear: float | Sequence[float] | Array,
@@ -136,14 +132,10 @@ def partial_slip(
     >>> round(float(pushed["sliding_force"][0]), 1)
     70.0
     """
-    from fractalcontact.contact import solver as contact_solver
-
+    problem, path = checked
     towards, shears, names = read_direction(direction), float_array(shear), word_tuple(keep)
-    path = _shear_path(crack, tangential_force, direction, friction_coefficient, method)
-    loads = {"closure": closure, "normal_force": normal_force, "nominal_pressure": nominal_pressure}
-    pressing = Pressing.read(crack, loads, influence=influence, disc_radius=disc_radius, tolerance=tolerance)
     rows = [
-        _pushed(ShearedContact.of_crack(pressing, float(value), towards), path, names)
+        _pushed(ShearedContact.of_crack(problem, float(value), towards), path, names)
         for value in track(shears, progress, "partial_slip", unit="shear")
     ]
     dims = ("shear", "step", "y", "x")
@@ -162,25 +154,23 @@ def partial_slip(
     result = xr.Dataset(variables, coords | (block_coords(crack) if names else {}))
     for name in STIFFNESSES:
         result[name] = result[name].where(np.isfinite(result[name]))
-    by_superposition = result["slip_method"] == contact_solver.METHODS.index("superposition")
+    by_superposition = result["slip_method"] == fc.contact.solver.METHODS.index("superposition")
     errors = result["superposition_error"].where(by_superposition, 0.0).values
     worst = int(np.argmax(np.abs(errors)))
     what = f"{WHERE}: the contact at a shear of {shears[worst]:g} m"
-    contact_solver.warn_lay(what, float(errors[worst]))
+    fc.contact.solver.warn_lay(what, float(errors[worst]))
     return result.assign_attrs(achieved_residual=float(result["residual"].max()))
 
 
 def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> dict[str, Any]:
     """Return the path of tangential forces at one shear, with the normal stiffness at its load."""
-    from fractalcontact.contact.solver import METHODS, normal_stiffness
-
-    pressing = contact.pressing
+    problem, solver = contact.problem, fc.contact.solver
     sheared = contact.shear(path, keep)
-    area, normal = pressing.crack.nominal_area, sheared.normal.force
-    block = _block_stiffness(pressing, replace(path, method=sheared.method))
+    area, normal = problem.crack.nominal_area, sheared.normal.force
+    block = _block_stiffness(problem, replace(path, method=sheared.method))
     shear_stiffness = _without_block(sheared.columns["tangential_stiffness"], block) / area
-    of_normal = np.array(normal_stiffness(sheared.normal))
-    interface_stiffness = _without_block(of_normal, pressing.block_stiffness) / area
+    of_normal = np.array(solver.normal_stiffness(sheared.normal))
+    interface_stiffness = _without_block(of_normal, problem.block_stiffness) / area
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = shear_stiffness / interface_stiffness
     return (
@@ -192,24 +182,22 @@ def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> di
             "interface_stiffness": interface_stiffness,
             "sliding_force": path.friction * normal,
             "contact_area": sheared.contact_area,
-            "slip_method": np.int8(METHODS.index(sheared.method)),
+            "slip_method": np.int8(solver.METHODS.index(sheared.method)),
             "superposition_error": sheared.superposition_error,
             "closure": sheared.normal.closure,
             "normal_force": normal,
-            "nominal_pressure": normal / pressing.grid.nominal_area,
+            "nominal_pressure": normal / problem.grid.nominal_area,
         }
     )
 
 
-def _block_stiffness(pressing: Pressing, path: ShearPath) -> float:
+def _block_stiffness(problem: JointProblem, path: ShearPath) -> float:
     """Return the tangential stiffness of the flat block, all of which sticks, N/m."""
-    if path.method == "superposition" or not math.isfinite(pressing.block_stiffness):
-        return pressing.block_stiffness * 2 * (1 - path.poisson) / (2 - path.poisson)
-    from fractalcontact.contact.solver import LoadPath, solve_shear
-
-    flat, load = np.zeros(pressing.grid.shape), LoadPath("normal_force", (1.0,))
-    problem = (pressing.grid, pressing.modulus, pressing.options, load)
-    stuck = solve_shear(flat, *problem, replace(path, forces=(0.0,), friction=1.0))
+    if path.method == "superposition" or not math.isfinite(problem.block_stiffness):
+        return problem.block_stiffness * 2 * (1 - path.poisson) / (2 - path.poisson)
+    load = fc.contact.solver.LoadPath("normal_force", (1.0,))
+    flat = np.zeros(problem.grid.shape), problem.grid, problem.modulus, problem.options, load
+    stuck = fc.contact.solver.solve_shear(*flat, replace(path, forces=(0.0,), friction=1.0))
     return float(stuck.columns["tangential_stiffness"][0])
 
 

@@ -29,6 +29,8 @@ TURNS = ("x", "y")  # about which a body may be turned over
 
 def _check(problems: Problems) -> None:
     given = problems.given
+    problems.boolean("rotation")
+    problems.boolean("tilt")
     problems.choice("turn_upper", among=TURNS, optional=True)
     valid = [
         problems.surface(name, face, finite=False, smallest=16)  # see the widest smoothing of `find_pose`

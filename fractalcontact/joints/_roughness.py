@@ -46,7 +46,8 @@ FEW_PROFILES = "NaN where fewer than 20 profiles are long enough, or some are st
 REFERENCES = (
     "Tse, R. and Cruden, D. M., Estimating joint roughness coefficients, Int. J. Rock Mech. Min. Sci. 16 "
     "(1979); Yu, X. and Vayssade, B., Joint profiles and their roughness parameters, Int. J. Rock Mech. Min. "
-    "Sci. 28 (1991)"
+    "Sci. 28 (1991); Tatone, B. S. A. and Grasselli, G., A new 2D discontinuity roughness parameter and its "
+    "correlation with JRC, Int. J. Rock Mech. Min. Sci. 47 (2010)"
 )
 
 

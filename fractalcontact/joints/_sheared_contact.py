@@ -1,17 +1,18 @@
 """A sheared crack that is pressed: its delta-surface between the two bodies, on plain arrays.
 
-    pressing = Pressing.read(crack, {"normal_force": [10.0, 100.0]}, keep="state", hardness=2e9)
-    columns = press_sheared(pressing, shears, towards, progress=False)
-    columns["interface_closure"], columns["state"]  # of shape (shear, step) and (shear, step, y, x)
+    problem = JointProblem(crack, LoadPath("normal_force", (10.0, 100.0)), options, keep=("state",))
+    columns = closure_columns(problem, shears, directions)
+    columns["interface_closure"]  # of shape (direction, shear, step)
+    columns["state"]  # of shape (direction, shear, step, y, x)
 
-Options and load are read once for each call; every shear goes to `contact.solver` as an array. The solver is
-imported where it is called: a study of rigid faces loads neither it nor the compiler.
+Options and load are read once for each call, by its check; every shear goes to `contact.solver` as an array.
+The solver is imported when it is first called: a study of rigid faces loads neither it nor the compiler.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import numpy as np
 import xarray as xr
 
+import fractalcontact as fc
 from fractalcontact.base.compass import Direction, direction_coords
 from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import Grid, read_grid
@@ -26,7 +28,7 @@ from fractalcontact.base.numbers import Array, number_of_entries
 from fractalcontact.base.provenance import differing
 from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.signals import track
-from fractalcontact.base.study import PAPER, joined_references, provenance_of
+from fractalcontact.base.study import BORRI_BRUNETTO_1998, joined_references, provenance_of
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights
@@ -44,12 +46,12 @@ BULK = {"flat_block": FLAT_BLOCK, "uniform_pressure": UNIFORM_PRESSURE}
 LOADS = ("closure", "normal_force", "nominal_pressure")
 CONTACT_OPTIONS = ("influence", "disc_radius", "hardness", "tolerance", "method")
 # bytes of a cell: the solver of a free body with the steps before (196), delta-surface and flat block
-PRESSING_BYTES = 236.0
+PRESS_BYTES = 236.0
 
 
 @dataclass(frozen=True)
-class Pressing:
-    """How a crack is pressed at every shear: load, solver options, bulk part, maps to keep, and the caller.
+class JointProblem:
+    """A crack that is pressed at every shear: load, options of the solver, bulk part, and maps to keep.
 
     With a `factor` only every so many heights of the delta-surface are kept along both axes.
     """
@@ -61,26 +63,10 @@ class Pressing:
     keep: tuple[str, ...] = ()
     factor: int = 1
 
-    @classmethod
-    def read(
-        cls,
-        crack: Crack,
-        loads: Mapping[str, Any],
-        *,
-        bulk: str = "flat_block",
-        keep: Any = (),
-        **contact_options: Any,
-    ) -> Pressing:
-        """Return it from arguments that passed `check_pressing`, with some of `CONTACT_OPTIONS`."""
-        from fractalcontact.contact.solver import ContactOptions, LoadPath
-
-        options = ContactOptions(_boundary(crack), **contact_options)
-        return cls(crack, LoadPath.among(loads), options, bulk, word_tuple(keep))
-
     @property
     def references(self) -> str:
         """The sources of the closure of a delta-surface and of the solver that presses it."""
-        return joined_references(PAPER, self.options.references(self.grid))
+        return joined_references(BORRI_BRUNETTO_1998, self.options.references(self.grid))
 
     @cached_property
     def modulus(self) -> float:
@@ -99,35 +85,35 @@ class Pressing:
     @cached_property
     def block_stiffness(self) -> float:
         """Stiffness of the flat block, N/m; infinite for a periodic one."""
-        from fractalcontact.contact import solver
+        loaded = BULK[self.bulk][0]
+        return fc.contact.solver.block_stiffness(self.grid, self.modulus, self.options, loaded)
 
-        return solver.block_stiffness(self.grid, self.modulus, self.options, BULK[self.bulk][0])
 
-
-def check_pressing(problems: Problems, **replaced: Any) -> LoadPath | None:
-    """Check load and options of the solver; return the load unless it is wrong.
-
-    They are the arguments of the call, or what replaces these.
-    """
-    from fractalcontact.contact.solver import ContactOptions, LoadPath
-
+def check_problem(problems: Problems, **replaced: Any) -> JointProblem | None:
+    """Check load and options of a call, or what replaces them; return the problem if all so far is valid."""
     arguments, crack = vars(problems.given) | replaced, problems.given.crack
-    load = problems.construct(LoadPath.among, arguments)
-    options = problems.construct(ContactOptions.among, arguments)
-    if "bulk" in arguments:
+    if isinstance(crack, Crack):
+        arguments["boundary"] = "periodic" if all(crack.layout.periodic) else "free"
+    options = problems.construct(fc.contact.solver.ContactOptions.among, arguments)
+    load = problems.construct(fc.contact.solver.LoadPath.among, arguments)
+    has_bulk = "bulk" in arguments  # `keep` are then maps of `contact.press`
+    if has_bulk:
         problems.choices("keep", among=CONTACT_MAPS, optional=True)
         problems.choice("bulk", among=BULK)
     if arguments.get("pressed") is not None:
         _check_pressed(problems)
     if options is None or not isinstance(crack, Crack):
-        return load
+        return None
     layout = crack.layout
-    grid = Grid(layout.cells, layout.spacing, layout.periodic)
-    replace(options, boundary=_boundary(crack)).check_grid(grid, problems)
-    if load is not None:
-        check_elastic(problems, crack)
-        options.check_load(load, crack.nominal_area, problems)
-    return load
+    options.check_grid(Grid(layout.cells, layout.spacing, layout.periodic), problems)
+    if load is None:
+        return None
+    check_elastic(problems, crack)
+    options.check_load(load, crack.nominal_area, problems)
+    if problems.messages:
+        return None
+    further = (arguments["bulk"], word_tuple(arguments["keep"])) if has_bulk else ()
+    return JointProblem(crack, load, options, *further)
 
 
 def check_unpressed(problems: Problems, function: Callable[..., object], names: Sequence[str]) -> None:
@@ -141,25 +127,19 @@ def check_unpressed(problems: Problems, function: Callable[..., object], names: 
         problems.require(unused, name, "nothing without a force: rigid faces are not pressed")
 
 
-def _boundary(crack: Crack) -> str:
-    return "periodic" if all(crack.layout.periodic) else "free"
-
-
 class ShearedContact:
-    """The heights of a delta-surface (m, on the grid of `pressing`), to be pressed along paths of load."""
+    """The heights of a delta-surface (m, on the grid of `problem`), to be pressed along paths of load."""
 
-    def __init__(self, pressing: Pressing, heights: Array, shear: float, towards: Direction) -> None:
-        from fractalcontact.contact import solver
-
-        self.pressing, self.heights = pressing, heights
+    def __init__(self, problem: JointProblem, heights: Array, shear: float, towards: Direction) -> None:
+        self.problem, self.heights = problem, heights
         self.place = f"at a shear of {shear:g} m towards {towards.name}"
-        self.rms_slope = solver.rms_slope(heights, pressing.grid)
+        self.rms_slope = fc.contact.solver.rms_slope(heights, problem.grid)
 
     @classmethod
-    def of_crack(cls, pressing: Pressing, shear: float, towards: Direction) -> ShearedContact:
+    def of_crack(cls, problem: JointProblem, shear: float, towards: Direction) -> ShearedContact:
         """Return that of the crack at a shear."""
-        heights = delta_heights(pressing.crack, shear, towards)
-        return cls(pressing, heights[:: pressing.factor, :: pressing.factor], shear, towards)
+        heights = delta_heights(problem.crack, shear, towards)
+        return cls(problem, heights[:: problem.factor, :: problem.factor], shear, towards)
 
     def press(self, load: LoadPath, keep: Sequence[str] = ()) -> Columns:
         """Press along a path of load.
@@ -170,33 +150,27 @@ class ShearedContact:
             The scalars of `contact.press`, bulk_closure and interface_closure (m), and the name of the
             solver, shape (step,); maps (step, y, x); rms_slope, a number.
         """
-        from fractalcontact.contact import solver
-
-        pressing = self.pressing
-        pressed = self._solve(solver.solve, load, keep=keep)
+        pressed = self._solve(fc.contact.solver.solve, load, keep=keep)
         columns = pressed.columns | pressed.maps
         columns |= {"rms_slope": np.array(self.rms_slope), "solver": np.array(pressed.solvers)}
-        # the mean displacement of a periodic body is a rigid motion: no bulk part, also for a force of NaN
-        has_bulk = np.isfinite(pressing.block_stiffness)
-        bulk = columns["normal_force"] / pressing.block_stiffness if has_bulk else 0.0 * columns["closure"]
+        stiffness = self.problem.block_stiffness
+        if np.isfinite(stiffness):
+            bulk = columns["normal_force"] / stiffness
+        else:  # the mean displacement of a periodic body is a rigid motion; the force may be NaN
+            bulk = np.zeros_like(columns["closure"])
         return columns | {"bulk_closure": bulk, "interface_closure": columns["closure"] - bulk}
 
     def shear(self, path: ShearPath, keep: Sequence[str] = ()) -> Sheared:
         """Press by the load, and push the block along a path of tangential force."""
-        from fractalcontact.contact import solver
-
-        return self._solve(solver.solve_shear, self.pressing.load, path, keep=keep)
+        return self._solve(fc.contact.solver.solve_shear, self.problem.load, path, keep=keep)
 
     def _solve(self, solve: Callable[..., T], load: LoadPath, *path: ShearPath, keep: Sequence[str]) -> T:
         """Check that a load is in proportion to the heights, and solve; an error names caller and shear."""
-        from fractalcontact.contact.solver import check_scale
-
-        pressing, height_range = self.pressing, float(np.ptp(self.heights))
-        problem = pressing.modulus, pressing.options, load
+        problem = self.problem.grid, self.problem.modulus, self.problem.options, load
         try:
             with Problems("") as problems:
-                check_scale(problems, pressing.grid, height_range, *problem)
-            return solve(self.heights, pressing.grid, *problem, *path, keep=keep)
+                fc.contact.solver.check_scale(problems, float(np.ptp(self.heights)), *problem)
+            return solve(self.heights, *problem, *path, keep=keep)
         except InvalidInput as error:
             lines = [f"{line} ({self.place})" for line in error.problems]
             raise InvalidInput("", lines) from error
@@ -209,8 +183,8 @@ class Spring(NamedTuple):
     stiffness: float
 
 
-def press_sheared(
-    pressing: Pressing,
+def closure_columns(
+    problem: JointProblem,
     shears: Array,
     directions: Sequence[Direction],
     progress: bool = False,
@@ -227,26 +201,26 @@ def press_sheared(
     dict of ndarray
         As `ShearedContact.press`, with direction and shear as first axes.
     """
-    from fractalcontact.contact import solver
-
     by_direction = []
     for i, towards in enumerate(directions):
         rows, at_rest = [], None
         if spring is not None:
-            at_rest = ShearedContact.of_crack(pressing, 0.0, towards).press(pressing.load)
+            at_rest = ShearedContact.of_crack(problem, 0.0, towards).press(problem.load)
         for j, shear in enumerate(track(shears, progress, f"press, towards {towards.name}", unit="shear")):
-            columns = None if pressed is None else _held_columns(pressed, shear, towards, pressing.load)
+            columns = None if pressed is None else _pressed_columns(pressed, shear, towards, problem.load)
             if columns is None:
-                contact = ShearedContact.of_crack(pressing, float(shear), towards)
+                contact = ShearedContact.of_crack(problem, float(shear), towards)
                 if spring is None or at_rest is None:
-                    columns = contact.press(pressing.load, pressing.keep)
+                    columns = contact.press(problem.load, problem.keep)
                 else:
                     openings = spring.dilatancy[i, j] + at_rest["interface_closure"]
                     columns = press_against_spring(contact, openings, spring.stiffness)
             rows.append(columns)
         by_direction.append(stacked(rows))
     columns = stacked(by_direction)
-    solver.warn_steep("fractalcontact.joints: the delta-surface", float(columns["rms_slope"].max()))
+    fc.contact.solver.warn_steep(
+        "fractalcontact.joints: the delta-surface", float(columns["rms_slope"].max())
+    )
     return columns
 
 
@@ -265,7 +239,7 @@ def press_against_spring(contact: ShearedContact, openings: Array, stiffness: fl
     """
     steps = [
         _press_balanced(contact, float(force), float(opening), stiffness)
-        for force, opening in zip(contact.pressing.load.values, openings, strict=True)
+        for force, opening in zip(contact.problem.load.values, openings, strict=True)
     ]
     slope = {"rms_slope": steps[0].pop("rms_slope")}
     return slope | {name: np.concatenate([step[name] for step in steps]) for name in steps[0]}
@@ -284,14 +258,14 @@ def _press_balanced(
     from scipy.optimize import brentq
 
     def press(force: float, keep: Sequence[str] = ()) -> Columns:
-        return contact.press(replace(contact.pressing.load, values=(force,)), keep)
+        return contact.press(replace(contact.problem.load, values=(force,)), keep)
 
     def excess(force: float) -> float:
         interface_closure = press(force)["interface_closure"][0] if force > 0 else 0.0
         return float(force - initial - stiffness * (opening - interface_closure))
 
     if initial + stiffness * opening <= 0:  # the faces sink away from the spring
-        return press(0.0, contact.pressing.keep)
+        return press(0.0, contact.problem.keep)
     at_initial = excess(initial) if initial > 0 else -stiffness * opening
     low, high = (initial, initial - at_initial) if at_initial < 0 else (0.0, initial)
     if abs(at_initial) <= error * initial:
@@ -302,7 +276,7 @@ def _press_balanced(
         force = np.exp(log_force)
     else:
         force = brentq(excess, low, high, xtol=error * high, maxiter=most)
-    return press(float(force), contact.pressing.keep)
+    return press(float(force), contact.problem.keep)
 
 
 def _check_pressed(problems: Problems) -> None:
@@ -318,7 +292,7 @@ def _check_pressed(problems: Problems) -> None:
     problems.require(number_of_entries(given.keep) == 0, "pressed", "nothing beside `keep`")
 
 
-def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: LoadPath) -> Columns | None:
+def _pressed_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: LoadPath) -> Columns | None:
     """Return the columns of `ShearedContact.press` from a result of `closure`; None if it lacks a load."""
     names, shears = np.atleast_1d(pressed["direction"].values), pressed["shear"].values
     if towards.name not in names or shear not in shears:
@@ -326,20 +300,20 @@ def _held_columns(pressed: xr.Dataset, shear: float, towards: Direction, load: L
     place: dict[str, Any] = {"direction": int(np.flatnonzero(names == towards.name)[0])}
     place |= {"shear": int(np.flatnonzero(shears == shear)[0])}
     at_shear = pressed.isel(place, missing_dims="ignore")
-    held = at_shear[load.control].values
-    steps = [np.flatnonzero(held == value) for value in load.values]
-    if not all(found.size for found in steps):
+    loads = at_shear[load.control].values
+    steps = [np.flatnonzero(loads == value) for value in load.values]
+    if not all(places.size for places in steps):
         return None
-    if "plastic_work" in at_shear and not np.array_equal(held[: len(steps)], load.values):
+    if "plastic_work" in at_shear and not np.array_equal(loads[: len(steps)], load.values):
         return None  # what yielded depends on the path
-    at_load = at_shear.isel(step=[int(found[0]) for found in steps])
+    at_load = at_shear.isel(step=[int(places[0]) for places in steps])
     of_steps = [str(name) for name, variable in at_load.variables.items() if variable.dims == ("step",)]
     columns = {name: at_load[name].values for name in of_steps if name != "step"}
     return columns | {"rms_slope": at_load["rms_slope"].values, "solver": np.full(len(steps), "as pressed")}
 
 
-def pressed_dataset(
-    pressing: Pressing,
+def closure_dataset(
+    problem: JointProblem,
     shears: Array,
     directions: Sequence[Direction],
     progress: bool = False,
@@ -347,14 +321,12 @@ def pressed_dataset(
     pressed: xr.Dataset | None = None,
     spring: Spring | None = None,
 ) -> xr.Dataset:
-    """Return the columns of `press_sheared` over (direction, shear, step), and maps over (..., y, x).
+    """Return the columns of `closure_columns` over (direction, shear, step), and maps over (..., y, x).
 
     Without a spring the prescribed load is the same at every shear, and a coordinate of `step` alone.
     """
-    from fractalcontact.contact import solver
-
-    crack, load = pressing.crack, pressing.load
-    columns = press_sheared(pressing, shears, directions, progress, pressed=pressed, spring=spring)
+    crack, load = problem.crack, problem.load
+    columns = closure_columns(problem, shears, directions, progress, pressed=pressed, spring=spring)
     dims = ("direction", "shear", "step", "y", "x")
     variables: dict[str, Any] = {name: (dims[: values.ndim], values) for name, values in columns.items()}
     solvers = variables.pop("solver")[1]
@@ -366,12 +338,12 @@ def pressed_dataset(
     coords |= {"shear": ("shear", shears), "step": np.arange(columns["closure"].shape[2])}
     coords |= direction_coords(directions)
     if any(values.ndim > 3 for values in columns.values()):
-        every = slice(None, None, pressing.factor)
+        every = slice(None, None, problem.factor)
         coords |= {dim: values[every] for dim, values in block_coords(crack).items()}
     result = xr.Dataset(variables, coords).assign(nominal_area=crack.nominal_area)
-    result["bulk_closure"].attrs["comment"] = BULK[pressing.bulk][1]
+    result["bulk_closure"].attrs["comment"] = BULK[problem.bulk][1]
     residual = float(np.max(columns["residual"]))
-    stated = {"references": pressing.references, **pressing.options.stated_on(pressing.grid)}
-    stated["solver"] = solver.solvers_in_words(solvers.ravel().tolist())
+    stated = {"references": problem.references, **problem.options.stated_on(problem.grid)}
+    stated["solver"] = fc.contact.solver.solvers_in_words(solvers.ravel().tolist())
     result.attrs.update(stated, achieved_residual=residual)
     return result

@@ -12,20 +12,20 @@ import xarray as xr
 from fractalcontact.base.compass import COMPASS, direction_coords, read_directions
 from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.regression import fitted_slope
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
-from fractalcontact.base.study import PAPER
+from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
 from fractalcontact.joints._criteria import POSITIVE, size_factors
 from fractalcontact.joints._dilatancy import rigid_dilatancies
 from fractalcontact.joints._friction import LOCKED
 from fractalcontact.joints._sheared_contact import (
-    PRESSING_BYTES,
-    Pressing,
-    check_pressing,
+    PRESS_BYTES,
+    JointProblem,
+    check_problem,
     check_unpressed,
-    press_sheared,
+    closure_columns,
 )
 
 USED_OPTIONS = ("influence", "hardness", "tolerance")
@@ -34,7 +34,7 @@ RIGID_FACES = "the faces are rigid: the crack has neither young nor poisson, and
 NO_EXPONENT = "NaN for a single size, and where a strength is missing or not positive"
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> JointProblem | None:
     given = problems.given
     weight = problems.number("unit_weight", **POSITIVE)
     check_sliding(problems, has_slid=True)
@@ -45,19 +45,22 @@ def _check(problems: Problems) -> None:
         problems.require(ascending, "structure_size", "ascending sizes, each once")
         if weight and isinstance(given.crack, Crack):
             force = (float(given.unit_weight) * sizes * given.crack.nominal_area).tolist()
-    if _is_rigid(given.crack):
+    if isinstance(given.crack, Crack) and given.crack.young is None and given.crack.poisson is None:
         check_unpressed(problems, self_weight, USED_OPTIONS)
-    else:
-        check_pressing(problems, normal_force=force)
+        return None
+    return check_problem(problems, normal_force=force)
 
 
 @public_result(
     title="shear strength of a joint under self-weight",
     reasons={"shear_strength": LOCKED, "strength_exponent": NO_EXPONENT},
     check=_check,
-    memory=PRESSING_BYTES,
+    memory=PRESS_BYTES,
 )
+@takes_checked
 def self_weight(
+    problem: JointProblem | None,
+    /,
     crack: Crack,
     *,
     structure_size: float | Sequence[float] | Array,
@@ -133,16 +136,14 @@ def self_weight(
     lifted, _ = rigid_dilatancies(crack, shears, directions)
     opening = np.repeat(lifted[..., None], sizes.size, axis=-1)
     variables: dict[str, Any] = {}
-    attributes: dict[str, Any] = {"references": PAPER}
-    if not _is_rigid(crack):
-        forces = {"normal_force": pressures * crack.nominal_area}
-        pressing = Pressing.read(crack, forces, influence=influence, hardness=hardness, tolerance=tolerance)
-        columns = press_sheared(pressing, shears, directions)
+    attributes: dict[str, Any] = {"references": BORRI_BRUNETTO_1998}
+    if problem is not None:
+        columns = closure_columns(problem, shears, directions)
         opening -= columns["interface_closure"]
         for name in ("residual", "converged", "rms_slope"):
             variables[name] = dims[: columns[name].ndim], columns[name]
         attributes = {
-            "references": pressing.references,
+            "references": problem.references,
             "achieved_residual": float(columns["residual"].max()),
         }
     angle = crack.basic_friction_angle + np.degrees(np.arctan(opening / shears[:, None]))
@@ -154,7 +155,7 @@ def self_weight(
     variables |= {
         "dilatancy": (dims, opening),
         "friction_angle": (dims, angle, {"comment": MEAN_ANGLE}),
-        "shear_strength": (dims, strength, {"comment": RIGID_FACES} if _is_rigid(crack) else {}),
+        "shear_strength": (dims, strength, {"comment": RIGID_FACES} if problem is None else {}),
         "strength_exponent": (dims[:-1], np.reshape(exponents, lifted.shape)),
         "basic_friction_angle": crack.basic_friction_angle,
         "nominal_area": crack.nominal_area,
@@ -162,10 +163,6 @@ def self_weight(
     coords = {"structure_size": sizes, "nominal_pressure": ("structure_size", pressures)}
     coords |= {"shear": ("shear", shears), **direction_coords(directions)}
     return xr.Dataset(variables, coords, attributes)
-
-
-def _is_rigid(crack: Any) -> bool:
-    return isinstance(crack, Crack) and crack.young is None and crack.poisson is None
 
 
 def _check_factors(problems: Problems) -> None:

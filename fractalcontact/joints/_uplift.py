@@ -464,15 +464,15 @@ def _balanced(
         return State(p, residual, _isolated(gap, p), 0, balances, float(stress), error)
 
     place = float(len(stresses) - 1)  # as the search states it
-    found = state(place)
-    while place > 0 and found.balance_error > 0:
-        place, above = place - 1, found
-        found = state(place)
-    if found.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
-        found = state(brentq(lambda at: state(at).balance_error, place, place + 1, xtol=place_error))
-    elif not found.converged:
-        found = found._replace(pressure=np.full_like(found.pressure, np.nan), effective_stress=math.nan)
-    return found._replace(iterations=state.cache_info().currsize)
+    trial = state(place)
+    while place > 0 and trial.balance_error > 0:
+        place, above = place - 1, trial
+        trial = state(place)
+    if trial.balance_error <= 0 and place < len(stresses) - 1 and above.balance_error > 0:
+        trial = state(brentq(lambda at: state(at).balance_error, place, place + 1, xtol=place_error))
+    elif not trial.converged:
+        trial = trial._replace(pressure=np.full_like(trial.pressure, np.nan), effective_stress=math.nan)
+    return trial._replace(iterations=state.cache_info().currsize)
 
 
 Knots = dict[str, tuple[Array, Array]]

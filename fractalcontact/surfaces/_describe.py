@@ -148,10 +148,10 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     if not complete and np.isnan(heights).all():
         return {"missing_points": heights.size}
     values, reference, scale = shifted(heights)
-    known = values if complete else values[~np.isnan(values)]
-    mean, ends = float(known.mean()), (float(known.min()), float(known.max()))
-    result = _heights(_powers(known, mean), known.size, mean, ends, reference, scale)
-    result["missing_points"] = values.size - known.size
+    observed = values if complete else values[~np.isnan(values)]
+    mean, ends = float(observed.mean()), (float(observed.min()), float(observed.max()))
+    result = _heights(_powers(observed, mean), observed.size, mean, ends, reference, scale)
+    result["missing_points"] = values.size - observed.size
     unit, steps = _scaled_steps(spacing)
     neighbours = _means(_neighbours(values, steps, periodic, scale / unit))
     by_modes = None
@@ -168,11 +168,12 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
     axes, ny, nx = surface.ndim, (1, *surface.shape)[-2], surface.shape[-1]
     low, high, origin, total, size, infinite = math.inf, -math.inf, math.nan, 0.0, 0, 0
     for block, _ in _row_blocks(surface):
-        known = block[~np.isnan(block)]
-        infinite += int(np.count_nonzero(np.isinf(known)))
-        low, high = min(low, float(known.min(initial=low))), max(high, float(known.max(initial=high)))
-        origin = float(known[0]) if known.size and math.isnan(origin) else origin  # for digits of the mean
-        total, size = total + float((known - origin).sum()), size + known.size
+        observed = block[~np.isnan(block)]
+        infinite += int(np.count_nonzero(np.isinf(observed)))
+        low, high = min(low, float(observed.min(initial=low))), max(high, float(observed.max(initial=high)))
+        if observed.size and math.isnan(origin):
+            origin = float(observed[0])  # for digits of the mean
+        total, size = total + float((observed - origin).sum()), size + observed.size
     require(infinite == 0, "surface", "finite heights, or NaN where missing", f"{infinite} infinite")
     if not size:
         return {"missing_points": surface.size}

@@ -231,11 +231,10 @@ def _header(line: str, delimiter: str | None, columns: int) -> tuple[tuple[str, 
     parts = line.split(delimiter) if delimiter else [match.group() for match in HEADED.finditer(line)]
     while len(parts) > columns and not parts[-1].strip():
         parts.pop()
-    matches = [HEADED.match(part.strip().strip("\"'").strip()) for part in parts]
-    if len(matches) != columns or any(match is None for match in matches):
+    matches = [match for part in parts if (match := HEADED.match(part.strip().strip("\"'").strip()))]
+    if not len(matches) == len(parts) == columns:
         return (), ()
-    found = [match for match in matches if match is not None]
-    return tuple(match["name"].strip() for match in found), tuple(match["unit"] or "" for match in found)
+    return tuple(match["name"].strip() for match in matches), tuple(match["unit"] or "" for match in matches)
 
 
 def _parsed(lines: list[tuple[int, str]], delimiter: str | None) -> Array:

@@ -123,8 +123,8 @@ def from_points(
     (True, 0.012)
     """
     surface = grid_points(points, spacing, triangles, units, plane, largest_gap)
-    given = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
-    return surface.assign_attrs(parameters=given)
+    parameters = {} if isinstance(points, xr.Dataset) else {"points": list(np.shape(points))}
+    return surface.assign_attrs(parameters=parameters)
 
 
 def grid_points(
@@ -139,8 +139,8 @@ def grid_points(
     if surface is None and values.shape[1] == 2:
         surface = _profile(values, step, largest_gap, cells)
     elif surface is None:
-        given = None if triangles is None else _finite_triangles(_fit_plane.point_array(points), triangles)
-        surface = _triangulated(values, step, given, largest_gap, cells)
+        faces = None if triangles is None else _finite_triangles(_fit_plane.point_array(points), triangles)
+        surface = _triangulated(values, step, faces, largest_gap, cells)
     return surface.assign_attrs(points=len(values), **frame)
 
 
@@ -232,8 +232,8 @@ class _Axis:
 def _regular_axes(points: Array, spacing: float | None) -> tuple[_Axis, ...] | None:
     """Return the axes (y, x), or (x,), of a uniform grid on which the points are; None if there is none."""
     columns = _columns(points)
-    found = [_regular_axis(points[:, column], len(points)) for column in columns]
-    axes = tuple(axis for axis in found if axis is not None)
+    candidates = [_regular_axis(points[:, column], len(points)) for column in columns]
+    axes = tuple(axis for axis in candidates if axis is not None)
     if len(axes) < len(columns):
         return None
     if math.prod(axis.centres.size for axis in axes) > 2 * len(points):  # too few to leave gaps between them

@@ -53,9 +53,9 @@ def read_instrument(request: Request) -> xr.DataArray:
         reader, other_unit = _open(file, path)
         chosen = _channel(reader, request.channel, path.name)
         name = str(reader.format())
-        size, given = chosen.physical_sizes, units or ("m" if name in ARRAYS else None)
+        size, fallback = chosen.physical_sizes, units or ("m" if name in ARRAYS else None)
         lateral, vertical = chosen.unit if isinstance(chosen.unit, tuple) else (chosen.unit, chosen.unit)
-        unit, lateral = given or other_unit or vertical, lateral or given
+        unit, lateral = fallback or other_unit or vertical, lateral or fallback
         _require_stated(chosen, size, unit, lateral, spacing)
         heights, periodic = _heights(reader, chosen, size, path.name)
     steps = _steps(heights.shape, size, lateral, spacing)

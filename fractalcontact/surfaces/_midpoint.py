@@ -30,6 +30,7 @@ def _check(problems: Problems) -> None:
     _from_array.check_axes(problems, profile=False)
     problems.number("hurst", **HURST_RANGE)
     _from_array.check_length(problems, "rms_increment")
+    problems.boolean("additions")
     _from_array.check_ensemble(problems)
 
 

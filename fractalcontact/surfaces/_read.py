@@ -228,10 +228,10 @@ def _gridded_points(points: xr.Dataset, request: Request) -> xr.DataArray:
     units, spacing, stated = request.units, request.spacing, points.attrs["stated_unit"]
     require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
-    given = {"units": units or stated or "m", "plane": request.plane}
+    options = {"units": units or stated or "m", "plane": request.plane}
     with Problems("", UnreadableFile):  # its problems are those of the file
-        from_points.validate(points, step, **given)
-        surface = grid_points(points, step, None, **given, largest_gap=None)
+        from_points.validate(points, step, **options)
+        surface = grid_points(points, step, None, **options, largest_gap=None)
     widest = max(float(np.ptp(surface[dim].values)) for dim in surface.dims)
     if units is None and stated is None and widest > 20.0:  # or it is a scan of a dam
         message = (

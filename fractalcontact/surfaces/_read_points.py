@@ -60,8 +60,8 @@ def _check(problems: Problems) -> None:
     source = Path(given.path)
     problems.file("path")
     suffixes = (*MESHES, *CLOUDS, *LISTS)
-    known = _files.file_suffix(source) in suffixes
-    problems.require(known, "path", f"a file of points: {', '.join(suffixes)}", source.name)
+    is_readable = _files.file_suffix(source) in suffixes
+    problems.require(is_readable, "path", f"a file of points: {', '.join(suffixes)}", source.name)
 
 
 @public_result(
@@ -190,8 +190,8 @@ def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> l
         wanted = [names.index(c.lower()) if isinstance(c, str) and c.lower() in names else c for c in columns]
         if all(not isinstance(k, str) and k < number for k in wanted):
             return [int(k) for k in wanted]
-        given = ", ".join(map(repr, table.names)) or f"numbers from 0 to {number - 1}"
-        problem = f"columns: expected some of {given}, got {list(columns)!r}"
+        choices = ", ".join(map(repr, table.names)) or f"numbers from 0 to {number - 1}"
+        problem = f"columns: expected some of {choices}, got {list(columns)!r}"
     elif number < 2:
         problem = f"path: expected two or three columns in {path.name!r}, got {number}"
     elif names and _place(names, X) is not None and _place(names, Z) is not None:
@@ -202,9 +202,9 @@ def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> l
     elif not (names and table.is_named) and (number == 3 or _files.file_suffix(path) in ALWAYS_POINTS):
         return [0, 1, 2]
     else:
-        known = f"called {', '.join(map(repr, table.names))}" if names else f"without names, {number} of them"
+        label = f"called {', '.join(map(repr, table.names))}" if names else f"without names, {number} of them"
         problem = (
-            f"columns: expected the names or numbers of those of x, y, z; {path.name!r} has columns {known}"
+            f"columns: expected the names or numbers of those of x, y, z; {path.name!r} has columns {label}"
         )
     raise UnreadableFile("", [problem])
 

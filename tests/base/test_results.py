@@ -1,5 +1,6 @@
 """The path of every public result: validation, labels, run time, provenance."""
 
+import inspect
 import json
 
 import numpy as np
@@ -8,7 +9,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
-from fractalcontact.base.results import public_name, public_result
+from fractalcontact.base.results import public_name, public_result, takes_checked
 
 
 def _check_mean(problems):
@@ -83,3 +84,22 @@ def test_unknown_argument_names_the_function_and_the_nearest_argument():
         fc.contact.press(None, modulus=1e9)
     with pytest.raises(TypeError, match=r"fractalcontact\.contact\.press: missing .*contact_modulus"):
         fc.contact.press(None)
+
+
+def _read_scale(problems):
+    problems.number("scale", above=0)
+    return f"read {problems.given.scale}"
+
+
+@public_result(title="Scaled heights", achieved_error="exact", check=_read_scale)
+@takes_checked
+def scaled(checked, /, data, *, scale=1.0):
+    """Heights times a number."""
+    return (scale * data).rename("height").assign_attrs(seen=checked)
+
+
+def test_function_takes_what_its_check_returns():
+    result = scaled(fc.surfaces.from_array(np.eye(4), 1e-3), scale=2.0)
+    entry = json.loads(result.attrs["provenance"])
+    assert (entry["seen"], entry["parameters"]["scale"]) == ("read 2.0", 2.0)
+    assert list(inspect.signature(scaled).parameters) == ["data", "scale"]

@@ -136,9 +136,10 @@ def test_bad_input(wrong, message):
         fc.joints.partial_slip(crack(), **(given | wrong))
 
 
-def test_crack_without_friction_needs_a_coefficient():
+@pytest.mark.parametrize("load", [{}, {"closure": 1e-6}])
+def test_crack_without_friction_needs_a_coefficient(load):
     with pytest.raises(InvalidInput, match="basic_friction_angle"):
-        pushed(0.0, crack(basic_friction_angle=0.0), friction_coefficient=None)
+        pushed(0.0, crack(basic_friction_angle=0.0), friction_coefficient=None, **load)
 
 
 def test_ridged_faces_are_solved_fully():

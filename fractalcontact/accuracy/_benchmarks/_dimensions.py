@@ -16,7 +16,7 @@ Problem = tuple[xr.DataArray, dict[str, Any]]  # an ensemble of surfaces, option
 MEMBERS = 12  # the rms error is then known to a fifth, 1/sqrt(2 n)
 # an octave each
 SIZES = (32, 64, 128, 256, 512)
-WINDOW_SIZE = 256  # of the surfaces of `windows`
+WINDOW_SIZE = 256  # of the surfaces of `windows`: longest lags of 8 to 128 spacings, an octave each
 
 
 def benchmarks() -> tuple[Benchmark, ...]:

@@ -14,14 +14,17 @@ from fractalcontact.accuracy._benchmarks import Array, Benchmark, Method, larges
 
 # an octave each
 SIZES = (64, 128, 256, 512, 1024)
-HURST, COVERAGE, BOX = 0.5, 0.1, 4  # level sets of dimension 1.5; a tenth of the cells; in cells
+HURST = 0.5  # of level sets, of dimension 1.5: half-way between line and plane
+COVERAGE, BOX = 0.1, 4  # share of the cells, box in cells: the lacunarity is then 1.56
 # of a cascade, unequal and 1 in all: each order has a dimension of its own
 WEIGHTS = np.array([[0.4, 0.3], [0.2, 0.1]])
-ORDERS = (0.0, 2.0, 3.0)
-# site percolation on the square lattice: coverage, islands per cell, and the excess of a periodic mask
+ORDERS = (0.0, 2.0, 3.0)  # support, pairs, triples; the closed form has no value at 1
+# site percolation on the square lattice: coverage (Jacobsen, J. Phys. A 48:454003 (2015); Newman and Ziff,
+# Phys. Rev. Lett. 85:4104 (2000), had .59274621(13)), islands per cell, and the excess of a periodic mask
+# (Ziff, Finch and Adamchik, Phys. Rev. Lett. 79:3447 (1997))
 CRITICAL, PER_CELL, EXCESS = 0.59274605, 0.0275981, 0.8835
 CROSSINGS = 64  # the share that crosses is then known to 1/16, sqrt(.25/64)
-REPLICATES = 8  # random masks of the error; the first is timed
+REPLICATES = 8  # random masks: the rms error is then known to a quarter, 1/sqrt(2 n); the first is timed
 CARPET = np.array([[1, 1, 1], [1, 0, 1], [1, 1, 1]], bool)
 
 

@@ -20,10 +20,10 @@ from fractalcontact.accuracy._benchmarks import (
     value_of,
 )
 
-RIPPLE = 0.6  # amplitude of the sinusoidal aperture over its mean
-APERTURE = 1e-4  # m
-SHEAR = 0.13  # of the wavelength
-YOUNG = 30e9  # Pa
+RIPPLE = 0.6  # amplitude of the sinusoidal aperture over its mean: its cube varies by a factor of 64
+APERTURE = 1e-4  # m: any, the error is relative
+SHEAR = 0.13  # of the wavelength: at no size whole cells, so that heights are interpolated
+YOUNG = 30e9  # Pa, of concrete: the forces of the closure law are in proportion to it
 
 
 def benchmarks() -> tuple[Benchmark, ...]:

@@ -15,7 +15,7 @@ from fractalcontact.accuracy._benchmarks import HURST, Array, Benchmark, Method
 
 Generator = Callable[..., xr.DataArray]
 
-ROLLOFF, SHORT = 0.5, 4.0  # of the extent; in spacings
+ROLLOFF, SHORT = 0.5, 4.0  # of the extent; in spacings: two octaves between them at n = 32, seven at 1024
 
 
 def benchmarks() -> tuple[Benchmark, ...]:
