@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 
-# seconds without a sign of the copy, beyond those of ten calls, after which its calls are made here
+# seconds without a sign of the copy, beyond those of ten calls, after which its calls are made here: for one
+# that hangs (the end of one that dies is seen at once), also on a machine that others load
 PATIENCE = 60.0
 COPY_MEMORY = 1e9  # bytes that are free before this process is copied: the shipped study peaks at 422 MB
 TOKEN, MOST_CALLS = 2, 1 << 15  # bytes of a number, and numbers that a pipe of 64 kB holds
