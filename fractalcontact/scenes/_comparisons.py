@@ -1,6 +1,6 @@
 """What a run compares its results with, once: those without spikes of scans, and another form of friction.
 
-What it finds are sentences, attributes of the root of its results, which summary and report read.
+What it finds stands in words in attributes of the root of its results, which summary and report read.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from fractalcontact.scenes._summary import aperture_as_placed, scene_table
 
 
 def comparisons(tree: xr.DataTree) -> dict[str, str]:
-    """Return the sentences of a study: on `spikes`, and on the `energy_form`; those that it has."""
-    sentences = {"spikes": _spikes(tree), "energy_form": _energy_form(tree)}
-    return {name: text for name, text in sentences.items() if text}
+    """Return what there is to say of the `spikes` of the scans, and of the `energy_form` of friction."""
+    words = {"spikes": _spikes(tree), "energy_form": _energy_form(tree)}
+    return {name: text for name, text in words.items() if text}
 
 
 def _spikes(tree: xr.DataTree) -> str:
@@ -28,11 +28,10 @@ def _spikes(tree: xr.DataTree) -> str:
     clean: dict[str, xr.DataArray] = {}
     for name, path in (("surface", "surfaces"), ("upper", "joints/faces")):
         data, table = group_of(tree, path), scene_table(tree, name)
-        is_scan = "read" in table or "sample" in table
-        if data is None or "height" not in data or data["height"].ndim != 2 or not is_scan:
-            continue
-        if not table.get("despike") and min(data["height"].shape) >= 3:
-            clean[name] = public_function("surfaces.despike")(data["height"])
+        height = None if data is None else data.get("height")
+        is_scan = bool({"read", "sample"} & table.keys()) and not table.get("despike")
+        if is_scan and height is not None and height.ndim == 2 and min(height.shape) >= 3:
+            clean[name] = public_function("surfaces.despike")(height)
     counts = {name: int(each["removed_points"]) for name, each in clean.items() if each["removed_points"]}
     effects = list(_without_spikes(tree, clean["surface"])) if "surface" in counts else []
     effects += _lift_of_spikes(tree, clean) if counts else []
@@ -56,15 +55,12 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
     if jrc is not None:
         direction = [str(name) for name in np.atleast_1d(jrc["direction"].values)]
         measured = public_function("joints.roughness_coefficient")(clean, direction=direction)
-        values = measured["roughness_coefficient"].values
-        pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
-        if max(abs(after - before) for _, after, before in pairs) > 0.5:  # a fortieth of the scale
-            words = [(name, jrc_text(after, 0), jrc_text(before, 0)) for name, after, before in pairs]
-            text = [
-                f"{after}, not {before}, toward {name}" for name, after, before in words if after != before
-            ]
-            if text:
-                yield f"JRC is {', '.join(text)}"
+        new, old = (np.atleast_1d(each["roughness_coefficient"].values) for each in (measured, jrc))
+        texts = ([jrc_text(value, 0) for value in values] for values in (new, old))
+        rows = zip(*texts, direction, strict=True)
+        words = [f"{one}, not {other}, toward {name}" for one, other, name in rows if one != other]
+        if words and np.max(np.abs(new - old)) > 0.5:  # a fortieth of the scale
+            yield f"JRC is {', '.join(words)}"
 
 
 def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:
@@ -79,14 +75,14 @@ def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterat
 
 
 def _energy_form(tree: xr.DataTree) -> str:
-    """Return what the kinematic form leaves out of the peak friction angle."""
+    """Return what the form of friction with the elastic energy does to the peaks of the kinematic one."""
     friction, elastic = (group_of(tree, f"joints/{name}") for name in ("friction", "elastic_dilatancy"))
     if friction is None or "peak_friction_angle" not in friction or elastic is None:
         return ""
-    known = friction["peak_friction_angle"].notnull()
     form = provenance_of(friction).get("parameters", {}).get("form")
-    if "elastic_energy" not in elastic or form != "kinematic" or "plastic_work" in elastic or not known.any():
+    if form != "kinematic" or "elastic_energy" not in elastic or "plastic_work" in elastic:
         return ""
+    known = friction["peak_friction_angle"].notnull()
     angle = public_function("joints.friction")(  # over the same distance, of every member
         elastic,
         basic_friction_angle=float(friction["basic_friction_angle"].mean()),
@@ -97,7 +93,4 @@ def _energy_form(tree: xr.DataTree) -> str:
     more = more[np.isfinite(more)]
     found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
     found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
-    return (
-        "It is that of the kinematic form, which leaves out the elastic energy that the faces store while "
-        f'they slide: form = "energy" {" and ".join(found)}.'
-    )
+    return " and ".join(found)

@@ -95,8 +95,11 @@ def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         change = _strength_over_half(data)
         strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
         yield f"The peak friction angle {comment}.{strength}"
-    if text := tree.attrs.get("energy_form"):
-        yield text
+    if found := tree.attrs.get("energy_form"):
+        yield (
+            "It is that of the kinematic form, which leaves out the elastic energy that the faces store "
+            f'while they slide: form = "energy" {found}.'
+        )
 
 
 def _strength_over_half(friction: xr.Dataset) -> float | None:

@@ -260,18 +260,13 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
             problems.require(is_of_joint, "tree", f"at least one of joints/{', joints/'.join(GROUPS)}", NONE)
 
     study = of_member(tree, 0)
-    shown = list(_page_tables(study))
-    # the page has room for so many characters beside the strength
+    pairs = ((columns, made) for name, columns in SHOWN.items() for made in stage_tables(study, [name]))
+    shown = [made.selected(columns).shortened(4) for columns, made in pairs]
+    # the page has room for so many rows, and for so many characters beside the strength
     texts = [f"{each.title}\n{table(written_rows(each), 74, rule=False)}" for each in shown if each.heads]
     remarks = [remark for each in shown for remark in each.remarks]
     lines = "\n\n".join(texts).splitlines()
     return draw_page(study, lines, [*caveats(study), *remarks], figure)
-
-
-def _page_tables(study: xr.DataTree, most: int = 4) -> Iterator[ResultTable]:
-    """Yield the tables of the page with the columns that it shows, and at most so many rows."""
-    for name, columns in SHOWN.items():
-        yield from (made.selected(columns).shortened(most) for made in stage_tables(study, [name]))
 
 
 def caveats(tree: xr.DataTree) -> list[str]:
