@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 
-# seconds without a sign of the copy, beyond those of ten calls, after which its calls are made here
+# seconds without a sign of the copy, beyond those of ten calls, after which its calls are made here: for one
+# that hangs (the end of one that dies is seen at once), also on a machine that others load
 PATIENCE = 60.0
 COPY_MEMORY = 1e9  # bytes that are free before this process is copied: the shipped study peaks at 422 MB
 TOKEN, MOST_CALLS = 2, 1 << 15  # bytes of a number, and numbers that a pipe of 64 kB holds
@@ -60,9 +61,9 @@ def block_dask_import() -> None:
 def collect_rarely() -> None:
     """Let Python look for cycles of unreachable objects once for 50 000 new ones, not once for 700.
 
-    Only for the command line, whose process ends with its study. Measured for the shipped study: imports 1.27
-    -> 1.02 s of processor time, figures 2.9 -> 2.5 s, for 13 MB more in a process that draws all of them. At
-    its end the memory goes back as a whole, not object by object: .7 -> .1 s.
+    Only for the command line, whose process ends with its study. The shipped study takes 13.7 s of processor
+    time with it and 15.2 s without (medians of eight runs in turn on a busy machine, pairs 1.02 to 1.16),
+    and 433 and 437 MB: imports and figures make many objects, and at its end the memory goes back as a whole.
     """
     gc.set_threshold(50_000)
     atexit.register(gc.freeze)

@@ -72,11 +72,12 @@ LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
 SMALLEST_DIP = (7.98 / 3.95) ** (1 / 0.7)
 
 
-def check_quantities(problems: Problems, *required: str, **bounds: dict[str, Any]) -> None:
+def check_quantities(problems: Problems, *required: str, **bounds: dict[str, Any]) -> bool:
     """Check the arguments of the call that have `BOUNDS`, or others here; those required not None."""
-    for name in vars(problems.given):
-        if name in BOUNDS:
-            problems.number(name, **{**BOUNDS[name], **bounds.get(name, {})}, optional=name not in required)
+    names = [name for name in vars(problems.given) if name in BOUNDS]
+    allowed = {name: {**BOUNDS[name], **bounds.get(name, {})} for name in names}
+    good = [problems.number(name, **allowed[name], optional=name not in required) for name in names]
+    return all(good)
 
 
 def check_measured(problems: Problems, *measures: Any) -> None:

@@ -20,21 +20,27 @@ from fractalcontact.joints._roughness import roughness_coefficient as measured_c
 MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
 NO_STRENGTH = "NaN where the angle of a criterion reaches 90 degrees: the surface is too rough for it"
 OUTSIDE = "outside the range of the criterion where in_range is False"
+BELOW_VERTICAL = "less than 90 degrees with the basic friction angle"
 
 
 def _check(problems: Problems) -> None:
     given = problems.given
     problems.numbers("nominal_pressure", **_criteria.POSITIVE)
-    _criteria.check_quantities(problems, "wall_strength", "basic_friction_angle")
+    are_numbers = _criteria.check_quantities(problems, "wall_strength", "basic_friction_angle")
+    chosen: tuple[str, ...] = ()
     if given.criterion is None:
+        chosen = _usable(vars(given))
         expected = "heights, or an asperity_angle or roughness_coefficient in their place"
-        problems.require(bool(_usable(vars(given))), "surface", expected)
+        problems.require(bool(chosen), "surface", expected)
     elif problems.choices("criterion", among=_criteria.STRENGTH):
-        names = word_tuple(given.criterion)
-        problems.require(len(names) > 0, "criterion", "at least one", "an empty sequence")
-        for name in names:
+        chosen = word_tuple(given.criterion)
+        problems.require(len(chosen) > 0, "criterion", "at least one", "an empty sequence")
+        for name in chosen:
             for need in _missing(name, vars(given)):
                 problems.add(need, f"a value, for criterion {name!r}")
+    if are_numbers and given.asperity_angle is not None and _use_asperities(chosen):
+        total = float(given.asperity_angle) + float(given.basic_friction_angle)
+        problems.require(total < 90.0, "asperity_angle", BELOW_VERTICAL, total)
     _criteria.check_measured(problems, measured_coefficient, directional_roughness)
 
 
@@ -48,6 +54,11 @@ def _missing(criterion: str, given: Mapping[str, Any]) -> list[str]:
 
 def _usable(given: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in _criteria.STRENGTH if not _missing(name, given))
+
+
+def _use_asperities(criteria: Sequence[str]) -> bool:
+    """Return whether any of the criteria sees the joint as asperities of one angle."""
+    return any("asperity_angle" in _criteria.STRENGTH[name].needs for name in criteria)
 
 
 @public_result(
@@ -116,8 +127,8 @@ def strength_envelope(
     Raises
     ------
     InvalidInput
-        An argument is wrong or missing for a criterion, or the asperity angle and the basic friction angle
-        add up to 90 degrees.
+        An argument is wrong or missing for a criterion, or the asperity angle that a criterion needs and the
+        basic friction angle add up to 90 degrees.
 
     Notes
     -----
@@ -159,9 +170,9 @@ def strength_envelope(
     chosen = _usable(given) if criterion is None else word_tuple(criterion)
     measured = _measured(surface, direction)
     joint = _criteria.Joint.of(given, measured)
-    total = joint.asperity_angle + joint.basic_friction_angle
-    expected = "less than 90 degrees with the basic friction angle"
-    require(not total >= 90.0, "asperity_angle", expected, f"{total:g}")
+    if _use_asperities(chosen):  # an angle that is given has been checked: this one is measured
+        total = joint.asperity_angle + joint.basic_friction_angle
+        require(not total >= 90.0, "surface", f"a mean dip of {BELOW_VERTICAL}", round(total, 3))
     strengths, ranges = zip(
         *(_criteria.STRENGTH[name].strength(pressure, joint) for name in chosen), strict=True
     )

@@ -25,9 +25,9 @@ Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | matplotlib.figure.Sub
 STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` writes
 # inches, of figures with text of 9 points
 WIDTH = 7.2  # with several panels: A4 less margins of 13 mm
-PANEL = (5.2, 3.5)  # with one panel and its legend
-MAP = (4.6, 3.8)  # with one map and its colour bar
-COLUMNS = 3  # of panels, at most
+PANEL = (5.2, 3.5)  # with one panel and its legend: the axes are 3.3 to 3.5 wide and 3 high
+MAP = (4.6, 3.8)  # with one map and its colour bar: a square map has edges of 3.3
+COLUMNS = 3  # of panels, at most: their axes are 1.7 wide, those of four 1.1, less than the name of an axis
 
 # Okabe and Ito (2008): distinguishable with every kind of colour vision
 ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
@@ -47,7 +47,8 @@ STATE_COLOURS = (OPEN_COLOUR, CONTACT_COLOUR, RED)  # open, contact, yielded
 SLIP_COLOURS = (OPEN_COLOUR, CONTACT_COLOUR, ORANGE)  # open, stick, slip
 HEIGHT_MAP, FIELD_MAP, SEQUENCE_MAP = "cividis", "viridis", "viridis"
 MAX_LEGEND_ENTRIES = 8  # more do not fit beside a panel of usual height
-MAX_MARKED_POINTS = 15  # a curve with more points is drawn without markers
+# a curve with more points is drawn without markers: of 15 on a panel they are four widths apart, of 4 points
+MAX_MARKED_POINTS = 15
 MOST_DOTS = 40  # the same of dots, which are half as wide
 MOST_CURVES = 6  # in a panel: more cross each other, and their nulls or theories, illegibly
 # lines of the first, second ... of several kinds of curves; long dashes stay apart where curves are steep

@@ -29,10 +29,14 @@ R = TypeVar("R")
 K = TypeVar("K")
 Task = Callable[[PartStore, signals.Stop], R | None]
 
-SMALL_SURFACE = 1 << 20  # points up to which a second process may press at the same time
-WORTH_A_COPY = 0.5  # seconds of work, from which on a second process takes part of it
+# points up to which a second process may press at the same time: `press` takes 206 MB for 1024 x 1024, and a
+# copy is made where 1 GB is free; twice the edge is 822 MB
+SMALL_SURFACE = 1 << 20
+# seconds of work, from which on a second process takes part of it: to make one takes .01 s, and .09 s to send
+# a result of 16 MB
+WORTH_A_COPY = 0.5
 PER_POINT = 2.5e-7  # seconds of a task: `describe` takes .16 for 768 x 768 points, an estimate or a closure 1
-PAUSE = 0.2  # seconds between two checks whether a stop was requested
+PAUSE = 0.2  # seconds between two checks whether a stop was requested: who stops a study does not notice it
 RUNNING, STOPPING = "running", "stopping"
 LOST = "the study on workers did not end; with a folder, finished parts are kept, and the same run resumes"
 

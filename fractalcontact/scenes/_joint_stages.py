@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.study import MEMBER, group_of, provenance_of
+from fractalcontact.base.study import MEMBER
 from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
 from fractalcontact.scenes._result_tables import Column, amount, are_one, at_value, finite, length, plain
 from fractalcontact.scenes._scene import LOADS
@@ -95,19 +95,11 @@ def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         change = _strength_over_half(data)
         strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
         yield f"The peak friction angle {comment}.{strength}"
-    elastic = group_of(tree, "joints/elastic_dilatancy")
-    form = provenance_of(data).get("parameters", {}).get("form")
-    if elastic is None or "elastic_energy" not in elastic or form != "kinematic" or "plastic_work" in elastic:
-        return
-    angle = _energy_peak(elastic, data)
-    more, locked = (angle - data["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
-    more = more[np.isfinite(more)]
-    found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
-    found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
-    yield (
-        "It is that of the kinematic form, which leaves out the elastic energy that the faces store while "
-        f'they slide: form = "energy" {" and ".join(found)}.'
-    )
+    if found := tree.attrs.get("energy_form"):
+        yield (
+            "It is that of the kinematic form, which leaves out the elastic energy that the faces store "
+            f'while they slide: form = "energy" {found}.'
+        )
 
 
 def _strength_over_half(friction: xr.Dataset) -> float | None:
@@ -120,19 +112,6 @@ def _strength_over_half(friction: xr.Dataset) -> float | None:
             abs(strengths.isel(distance=0, drop=True) / strengths.isel(distance=1, drop=True) - 1.0)
         )
     return float(change.max()) if change.size else None
-
-
-def _energy_peak(elastic: xr.Dataset, friction: xr.Dataset) -> xr.DataArray:
-    """Return the peak friction angle of the energy form over the same distance, of every member."""
-    from fractalcontact import joints
-
-    peak: xr.DataArray = joints.friction(
-        elastic,
-        basic_friction_angle=float(friction["basic_friction_angle"].mean()),
-        form="energy",
-        distance=float(friction["peak_distance"].max()),
-    )["peak_friction_angle"]
-    return peak
 
 
 def _peak_distance(state: xr.Dataset) -> str | None:

@@ -27,6 +27,7 @@ from fractalcontact.base.resources import DRAWING_LOCK, most_workers
 from fractalcontact.base.study import provenance_of
 from fractalcontact.base.validation import Problems
 from fractalcontact.scenes import _result_tree, _results_folder
+from fractalcontact.scenes._comparisons import comparisons
 from fractalcontact.scenes._executor import Workers, run_tasks, worker_processes, workers_of
 from fractalcontact.scenes._export import MAP_DIMS, tables
 from fractalcontact.scenes._html_report import page_contents, write_report
@@ -220,6 +221,8 @@ def _run(
         if name in study.groups:
             warn_of_result(name, study.groups[name])
     tree = _result_tree.result_tree(scene, study)
+    if not study.missing:
+        tree.attrs |= comparisons(tree)
     if digest and not study.failures:
         tree.attrs[DIGEST] = digest
     _result_tree.note_run_time(tree, start)

@@ -14,7 +14,7 @@ from fractalcontact.base.grid import EXCESS_PER_EDGE
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of, member_count, of_member, scene_of
 from fractalcontact.base.tables import note, table
-from fractalcontact.base.units import fixed, jrc_text, number, quantity_text
+from fractalcontact.base.units import number, quantity_text
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
@@ -260,18 +260,13 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
             problems.require(is_of_joint, "tree", f"at least one of joints/{', joints/'.join(GROUPS)}", NONE)
 
     study = of_member(tree, 0)
-    shown = list(_page_tables(study))
-    # the page has room for so many characters beside the strength
+    pairs = ((columns, made) for name, columns in SHOWN.items() for made in stage_tables(study, [name]))
+    shown = [made.selected(columns).shortened(4) for columns, made in pairs]
+    # the page has room for so many rows, and for so many characters beside the strength
     texts = [f"{each.title}\n{table(written_rows(each), 74, rule=False)}" for each in shown if each.heads]
     remarks = [remark for each in shown for remark in each.remarks]
     lines = "\n\n".join(texts).splitlines()
     return draw_page(study, lines, [*caveats(study), *remarks], figure)
-
-
-def _page_tables(study: xr.DataTree, most: int = 4) -> Iterator[ResultTable]:
-    """Yield the tables of the page with the columns that it shows, and at most so many rows."""
-    for name, columns in SHOWN.items():
-        yield from (made.selected(columns).shortened(most) for made in stage_tables(study, [name]))
 
 
 def caveats(tree: xr.DataTree) -> list[str]:
@@ -322,51 +317,9 @@ def _no_interval(tree: xr.DataTree) -> Iterator[str]:
 
 
 def _spikes(tree: xr.DataTree) -> Iterator[str]:
-    """Yield how many points of the scans stand out from all around them, and what they do to the results."""
-    clean: dict[str, xr.DataArray] = {}
-    for name, path in (("surface", "surfaces"), ("upper", "joints/faces")):
-        data, table = group_of(tree, path), _table(tree, name)
-        is_scan = "read" in table or "sample" in table
-        if data is None or "height" not in data or data["height"].ndim != 2 or not is_scan:
-            continue
-        if table.get("despike") or min(data["height"].shape) < 3:
-            continue
-        from fractalcontact import surfaces  # only for scans that were not despiked
-
-        clean[name] = surfaces.despike(data["height"])
-    counts = {name: int(each["removed_points"]) for name, each in clean.items() if each["removed_points"]}
-    effects = list(_without_spikes(tree, clean["surface"])) if "surface" in counts else []
-    effects += _lift_of_spikes(tree, clean) if counts else []
-    if effects:
-        points = " and ".join(f"{count} of [{name}]" for name, count in counts.items())
-        without = ", ".join(effects)
-        yield f"points that stand out as spikes of a scan: {points}; without them {without} (--despike)."
-
-
-def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
-    """Yield the fractal dimension and the roughness coefficient without spikes, where they are others."""
-    estimates, jrc = group_of(tree, "dimensions"), group_of(tree, "joints/roughness_coefficient")
-    if estimates is not None and "default" in estimates["method"].values:
-        from fractalcontact import dimensions
-
-        before = float(estimates["fractal_dimension"].sel({"method": "default"}))
-        after = float(dimensions.estimate(clean, **_table(tree, "dimensions"))["fractal_dimension"][0])
-        # half of the usual interval, also where there is no D with them, or without
-        if not abs(after - before) <= 0.01:
-            yield f"D is {fixed(after, 2)}, not {fixed(before, 2)}"
-    if jrc is not None:
-        from fractalcontact import joints
-
-        direction = [str(name) for name in np.atleast_1d(jrc["direction"].values)]
-        values = joints.roughness_coefficient(clean, direction=direction)["roughness_coefficient"].values
-        pairs = list(zip(direction, values, np.atleast_1d(jrc["roughness_coefficient"].values), strict=True))
-        if max(abs(after - before) for _, after, before in pairs) > 0.5:  # a fortieth of the scale
-            words = [(name, jrc_text(after, 0), jrc_text(before, 0)) for name, after, before in pairs]
-            text = [
-                f"{after}, not {before}, toward {name}" for name, after, before in words if after != before
-            ]
-            if text:
-                yield f"JRC is {', '.join(text)}"
+    """Yield what spikes of the scans do to the results, which the run has compared."""
+    if text := tree.attrs.get("spikes"):
+        yield text
 
 
 def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
@@ -375,17 +328,6 @@ def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
     if upper is None or lower is None or "height" not in upper or "height" not in lower:
         return None
     return upper["height"] - lower["height"]
-
-
-def _lift_of_spikes(tree: xr.DataTree, clean: dict[str, xr.DataArray]) -> Iterator[str]:
-    """Yield the mean aperture of two faces at first touch without spikes, where it is another."""
-    aperture = aperture_as_placed(tree)
-    if aperture is None or set(clean) != {"surface", "upper"}:
-        return
-    without = clean["upper"].drop_vars("removed_points") - clean["surface"].drop_vars("removed_points")
-    before, after = (float(opening.mean() - opening.min()) for opening in (aperture, without))
-    if before - after > 0.1 * before:  # a tenth of the opening is worth a sentence
-        yield f"the faces first touch at a mean aperture of {length(after)}, not {length(before)}"
 
 
 def _tilt(tree: xr.DataTree) -> Iterator[str]:
@@ -458,7 +400,7 @@ def _true_pressure(tree: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterato
         return
     true = pressed["nominal_pressure"] / pressed["contact_fraction"].where(pressed["contact_fraction"] > 0)
     low, high = (f"{float(end) / 1e9:.2g}" for end in (true.min(), true.max()))
-    limits = _table(tree, "material").get("yield_pressure")
+    limits = scene_table(tree, "material").get("yield_pressure")
     if limits is not None and float(true.max()) > np.min(limits):
         span = " to ".join(f"{float(limit) / 1e9:.2g}" for limit in np.atleast_1d(limits))
         factor = float(true.max()) / float(np.max(limits))
@@ -485,7 +427,7 @@ def _slopes(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
 def _strength(tree: xr.DataTree) -> Iterator[str]:
     """Yield that the peak strength is beyond the pressure at which the material yields."""
     friction = group_of(tree, "joints/friction")
-    limits = _table(tree, "material").get("yield_pressure")
+    limits = scene_table(tree, "material").get("yield_pressure")
     if friction is None or limits is None or "peak_shear_strength" not in friction:
         return
     strengths = np.ravel(friction["peak_shear_strength"].values)
@@ -498,7 +440,7 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
         )
 
 
-def _table(tree: xr.DataTree, name: str) -> dict[str, Any]:
+def scene_table(tree: xr.DataTree, name: str) -> dict[str, Any]:
     """Return a table of the scene of a study, empty where there is none."""
     table = scene_of(tree).get(name)
     return table if isinstance(table, dict) else {}

@@ -32,8 +32,6 @@ from fractalcontact.scenes._stage_type import StageType, arguments_of, parameter
 from fractalcontact.scenes._stages import STAGES, WANTED, stages_of
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from fractalcontact.joints import Crack
 
 INPUTS = ("surface", "crack", "mask", "gap", "contact_modulus")  # that earlier tables or stages make

@@ -215,6 +215,25 @@ def test_xia_has_no_strength_on_a_surface_too_rough_for_it(make_face):
     assert not result.in_range.any()
 
 
+@pytest.mark.parametrize("criterion", ["barton_choubey", "barton_bandis", "grasselli_egger", "xia"])
+def test_steep_surface_suits_criteria_without_an_asperity_angle(make_face, criterion):
+    """Mean dip 45 degrees: with a friction angle of 50 degrees asperities of that angle cannot be climbed."""
+    x = np.arange(401) % 20
+    teeth = make_face(np.minimum(x, 20 - x) * 1e-3 * np.ones((5, 1)), 1e-3)
+    options = {"nominal_pressure": 1e6, "wall_strength": 1e8, "basic_friction_angle": 50}
+    options |= {"residual_friction_angle": 45, "length": 1.0}
+    both = [criterion, "ladanyi_archambault"]
+    with pytest.raises(ValueError, match="surface: expected a mean dip of less than 90 degrees"):
+        fc.joints.strength_envelope(teeth, criterion=both, **options)
+    alone = fc.joints.strength_envelope(teeth, criterion=criterion, **options)
+    less = options | {"asperity_angle": 30}  # given in place of the mean dip
+    same = fc.joints.strength_envelope(teeth, criterion=both, **less).sel(criterion=[criterion])
+    np.testing.assert_array_equal(alone.shear_strength, same.shear_strength)
+    assert alone.asperity_angle.item() == pytest.approx(45, abs=0.05)
+    with pytest.raises(ValueError, match="asperity_angle: expected less than 90 degrees .*, got 95"):
+        fc.joints.strength_envelope.validate(teeth, criterion=both, **options, asperity_angle=45)
+
+
 def test_asperity_angle_is_the_mean_dip_towards_the_shear(make_face):
     x = np.arange(401) % 20
     teeth = make_face(np.minimum(x, (20 - x) / 3) * 1e-3 * np.ones((5, 1)), 1e-3)

@@ -48,3 +48,32 @@ def test_root_of_a_file_states_the_main_results(tmp_path):
         assert float(root.fractal_dimension_low) < float(root.fractal_dimension)
         assert "results by group: dimensions, joints/rigid_dilatancy, joints/closure" in root.comment
         assert "contacts are not resolved" in root.caveats
+
+
+def test_summary_and_report_of_a_file_compute_nothing(tmp_path, monkeypatch):
+    """The file has what the run compared: the scan without spikes, another form of friction."""
+    scan = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=2e-5, rng=5)
+    scan.values[[11, 30], [17, 42]] += 2e-3
+    fc.save(scan, tmp_path / "scan.nc")
+    generated = SOUND.partition("[surface]")[2].partition("[material]")[0]
+    wanted = 'surfaces = ["height"]\ndimensions = ["default"]\n'
+    wanted += 'joints = ["roughness_coefficient", "elastic_dilatancy", "friction"]'
+    text = SOUND.replace(generated, '\nread = "scan.nc"\n')
+    text = text.replace('joints = ["closure", "rigid_dilatancy"]', wanted)
+    tree = fc.scenes.run(scene(tmp_path, text), out=tmp_path / "out", progress=False)
+    expected = fc.scenes.summary(tree, verbose=True)
+    words = " ".join(expected.split())
+    assert "points that stand out as spikes of a scan: 2 of [surface]; without them D is" in words
+    assert "JRC is" in words
+    assert 'form = "energy"' in words
+
+    def refuse(*_, **__):
+        raise AssertionError("computed again")
+
+    for subpackage in (fc.surfaces, fc.dimensions, fc.contact, fc.joints, fc.domains):
+        for name in (name for name in subpackage.__all__ if name[0].islower()):
+            monkeypatch.setattr(subpackage, name, refuse)
+    stored = fc.open(tmp_path / "out" / "result.nc")
+    assert fc.scenes.summary(stored, verbose=True) == expected
+    page = fc.scenes.report(tmp_path / "out" / "result.nc", figures=())
+    assert "stand out as spikes of a scan" in page.read_text(encoding="utf-8")
