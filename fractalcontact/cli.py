@@ -416,7 +416,7 @@ def _estimators(options: argparse.Namespace) -> int:
     names = ("hurst", "sizes", "families", "methods", "members")
     arguments = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     file = None if options.out is None else Path(options.out) / "estimators.nc"
-    result = fc.accuracy.estimators(**arguments, rng=options.seed, keep=file, progress=True)
+    result = fc.accuracy.estimators(**arguments, rng=options.seed, file=file, progress=True)
     print(fc.accuracy.summary(result))
     if file is not None:
         _write_figure(result, file.with_suffix(".png"))

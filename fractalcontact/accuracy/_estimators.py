@@ -41,7 +41,7 @@ ROLLOFF = 8.0
 SPACING, HEIGHT = 1e-4, 1e-6  # m: no result depends on them
 
 DIMS = ("method", "family", "hurst", "size")
-SAME = (*DIMS, "member_count", "blur", "noise", "marks")
+SAME = (*DIMS, "member_count", "blur", "relative_noise", "marks")
 MEASURED = (
     "bias",
     "rms_error",
@@ -58,7 +58,7 @@ MEASURED = (
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    for name in ("blur", "noise", "marks"):
+    for name in ("blur", "relative_noise", "marks"):
         problems.number(name, at_least=0.0)
     problems.boolean("progress")
     problems.numbers("hurst", **HURST_RANGE)
@@ -73,9 +73,9 @@ def _check(problems: Problems) -> None:
         lengths = 1, len(np.unique(given.sizes))
         expected = f"one number, or one for each of the {lengths[1]} sizes"
         problems.require(len(counts) in lengths, "members", expected)
-    if given.keep is not None:
-        named = isinstance(given.keep, (str, os.PathLike)) and Path(given.keep).suffix == ".nc"
-        problems.require(named, "keep", "a file name that ends in '.nc'")
+    if given.file is not None:
+        named = isinstance(given.file, (str, os.PathLike)) and Path(given.file).suffix == ".nc"
+        problems.require(named, "file", "a file name that ends in '.nc'")
 
 
 @public_result(title=TITLE, references=REFERENCES, check=_check)
@@ -87,10 +87,10 @@ def estimators(
     *,
     members: int | Sequence[int] | None = None,
     blur: float = 0.0,
-    noise: float = 0.0,
+    relative_noise: float = 0.0,
     marks: float = 0.0,
     rng: streams.RNGLike = None,
-    keep: str | os.PathLike[str] | None = None,
+    file: str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> xr.Dataset:
     """Measure every estimator of the Hurst exponent on surfaces whose exponent is known.
@@ -114,13 +114,13 @@ def estimators(
         (400, 100 and 25), which gives a coverage of 95 % to within 1, 2 and 4 %.
     blur : float
         Spread, in spacings, of a Gaussian filter of the free surfaces, which goes on beyond their edges.
-    noise : float
+    relative_noise : float
         Rms height of white noise added to them, over the rms increment before the blur.
     marks : float
         Amplitude of an oblique wave of seven spacings added to them, over the same.
     rng : None, int, SeedSequence, BitGenerator or Generator
         Random stream; its entropy is kept in the provenance.
-    keep : path-like, optional
+    file : path-like, optional
         NetCDF file that is written anew after every case. After a stop the same call continues from it. A
         file that is finished, or of another call, is replaced.
     progress : bool
@@ -152,9 +152,9 @@ def estimators(
     kinds = word_tuple(families)
     names = word_tuple(methods) or tuple(dimensions.methods())
     counts = _counts(members, edges)
-    defects = {"blur": float(blur), "noise": float(noise), "marks": float(marks)}
+    defects = {"blur": float(blur), "relative_noise": float(relative_noise), "marks": float(marks)}
     table = _empty_table(names, kinds, exponents, edges, counts).assign_coords(defects)
-    table, source = _resume(table, keep, rng)
+    table, source = _resume(table, file, rng)
     entropy = streams.record(source)
     places = [(k, h, n) for n in range(len(edges)) for k in range(len(kinds)) for h in range(exponents.size)]
     # every case has a stream of its own, whatever else is asked for in the same run
@@ -171,8 +171,8 @@ def estimators(
         for row, sample in enumerate(np.moveaxis(samples, -1, 0)):
             for name, value in _scores(truth, bound, *sample).items():
                 table[name].values[(row, *place)] = value
-        if keep is not None:
-            save(_checkpoint(table, entropy), keep)
+        if file is not None:
+            save(_checkpoint(table, entropy), file)
     return _with_reasons(table).assign_attrs(random=entropy)
 
 
@@ -264,9 +264,9 @@ def _surfaces(
         spread = (0.0, *[defects["blur"]] * (result.ndim - 1))
         result = result.copy(data=gaussian_filter(result.values, spread))
     result = result.isel({axis: slice(margin, margin + n) for axis in result.dims[1:]})
-    if defects["noise"]:
+    if defects["relative_noise"]:
         scatter = stream.standard_normal(result.shape)
-        result = result + defects["noise"] * HEIGHT * scatter
+        result = result + defects["relative_noise"] * HEIGHT * scatter
     if defects["marks"]:
         azimuth = 0.5  # radian: oblique to both axes
         along = np.cos(azimuth) * result.x + (np.sin(azimuth) * result.y if "y" in result.dims else 0.0)

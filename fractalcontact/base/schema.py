@@ -509,7 +509,7 @@ QUANTITIES: dict[str, Quantity] = {
     "bias": Quantity("1", "mean error of the Hurst exponent"),
     "rms_error": Quantity("1", "root mean square error of the Hurst exponent"),
     "blur": Quantity("1", "spread of the blur, in spacings"),
-    "noise": Quantity("1", "rms height of white noise over the rms increment"),
+    "relative_noise": Quantity("1", "rms height of white noise over the rms increment"),
     "marks": Quantity("1", "amplitude of an oblique wave over the rms increment"),
     "least_error": Quantity("1", "least standard deviation of the Hurst exponent (Cramer-Rao bound)"),
     **_with_ends("error_ratio", "1", "root mean square error over the Cramer-Rao bound"),

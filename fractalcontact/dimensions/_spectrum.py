@@ -36,8 +36,8 @@ def _check(problems: Problems) -> None:
     given = problems.given
     reserved = (*_NAMES.values(), "wavenumber", "wavelength", "mode_count", *ALWAYS)
     is_valid = check_surface(problems, smallest=4, gaps=False, reserved=reserved)
-    if given.window is not None:
-        problems.choice("window", among=("auto", "hann", "none"))
+    if given.taper is not None:
+        problems.choice("taper", among=("auto", "hann", "none"))
     if problems.integer("tile", at_least=8, optional=True) and is_valid and given.tile is not None:
         shortest = min(given.surface.sizes[dim] for dim in ("y", "x") if dim in given.surface.dims)
         problems.require(given.tile <= shortest, "tile", f"at most {shortest}")
@@ -46,23 +46,23 @@ def _check(problems: Problems) -> None:
 @public_result(
     title="Power spectral density of a surface",
     references=METHODS["spectrum"].references,
-    achieved_error="relative standard error of each value sqrt(2 / mode_count), where no window mixes the "
+    achieved_error="relative standard error of each value sqrt(2 / mode_count), where no taper mixes the "
     "modes",
     check=_check,
     in_blocks=True,
     memory=36.0,
 )
-def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | None = None) -> xr.Dataset:
+def spectrum(surface: xr.DataArray, *, taper: str | None = "auto", tile: int | None = None) -> xr.Dataset:
     """Return the radially averaged power spectral density of a surface.
 
     Parameters
     ----------
     surface : DataArray
         Heights in m, dims (..., y, x) or (..., x) for a profile, without gaps.
-    window : "auto", "hann" or None
-        Taper of the free axes. "auto" is "hann" on free axes and None on periodic ones. With None, the
-        edges of a free surface show as a tail q^-3. A plane is removed first, except where both axes are
-        periodic; there only the mean is.
+    taper : "auto", "hann" or None
+        Of the free axes (a window function). "auto" is "hann" on free axes and None on periodic ones. With
+        None, the edges of a free surface show as a tail q^-3. A plane is removed first, except where both
+        axes are periodic; there only the mean is.
     tile : int, optional
         Average the spectra of square tiles of this edge in points, overlapping by half (Welch 1967): for
         surfaces that do not fit in memory, or for a smoother curve. Default: the whole surface, of a dask
@@ -100,13 +100,13 @@ def spectrum(surface: xr.DataArray, *, window: str | None = "auto", tile: int | 
     >>> round(-(slope + 2) / 2, 1)
     0.7
     """
-    taper = "none" if window is None else window
+    name = "none" if taper is None else taper
     shape = read_surfaces(surface)[0].grid.shape
     if tile is None and is_lazy(surface) and math.prod(shape) > LARGEST**2:
         tile = min(LARGEST ** (3 - len(shape)), *shape)
     return curve_dataset(
         surface,
-        lambda single: ring_curve(single, taper, tile),
+        lambda single: ring_curve(single, name, tile),
         "wavenumber",
         _NAMES[2 if "y" in surface.dims else 1],
         count="mode_count",

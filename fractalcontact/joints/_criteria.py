@@ -64,6 +64,36 @@ ARGUMENTS: dict[str, Mapping[str, Any]] = {
 # of the arguments of the functions around these formulas
 BOUNDS = ARGUMENTS | {"aperture": POSITIVE, "compressive_strength": POSITIVE}
 
+# Joint roughness coefficient of profiles
+
+
+class Regression(NamedTuple):
+    """JRC = offset + factor f(Z2) of readings one interval (m) apart; f is log10 without a power."""
+
+    interval: float
+    offset: float
+    factor: float
+    power: float | None
+
+    def coefficient(self, slope: Any) -> Any:
+        """Return JRC of a slope Z2 or of several; minus infinity for a slope of 0 under a logarithm."""
+        with np.errstate(divide="ignore"):
+            return self.offset + self.factor * (np.log10(slope) if self.power is None else slope**self.power)
+
+
+# Tse and Cruden read the standard profiles every 1.27 mm on prints enlarged 2.5 times in both axes (Li and
+# Zhang 2015, Int. J. Rock Mech. Min. Sci. 77:27), which leaves slopes as they are: 0.508 mm on the joint.
+# The interval of the first one is the default lag.
+REGRESSIONS = {
+    "tse_cruden": (Regression(0.508e-3, 32.2, 32.47, None),),
+    "yu_vayssade": (
+        Regression(0.5e-3, -3.47, 61.79, 1.0),
+        Regression(0.25e-3, -4.51, 60.32, 1.0),
+        Regression(1e-3, -2.31, 64.22, 1.0),
+    ),
+    "tatone_grasselli": (Regression(0.5e-3, -10.37, 51.85, 0.60), Regression(1e-3, -6.10, 55.03, 0.74)),
+}
+
 # Shear strength
 
 LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle

@@ -15,30 +15,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import ROUNDING, detrended, rounding_of, slopes
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
-from fractalcontact.joints._criteria import LARGEST_JRC, SAMPLE_LENGTH, scaled_roughness
-
-
-class Regression(NamedTuple):
-    """JRC = offset + factor f(Z2) of readings one interval (m) apart; f is log10 without a power."""
-
-    interval: float
-    offset: float
-    factor: float
-    power: float | None
-
-
-# Tse and Cruden read the standard profiles every 1.27 mm on prints enlarged 2.5 times in both axes (Li and
-# Zhang 2015, Int. J. Rock Mech. Min. Sci. 77:27), which leaves slopes as they are: 0.508 mm on the joint.
-# The interval of the first one is the default lag.
-REGRESSIONS = {
-    "tse_cruden": (Regression(0.508e-3, 32.2, 32.47, None),),
-    "yu_vayssade": (
-        Regression(0.5e-3, -3.47, 61.79, 1.0),
-        Regression(0.25e-3, -4.51, 60.32, 1.0),
-        Regression(1e-3, -2.31, 64.22, 1.0),
-    ),
-    "tatone_grasselli": (Regression(0.5e-3, -10.37, 51.85, 0.60), Regression(1e-3, -6.10, 55.03, 0.74)),
-}
+from fractalcontact.joints._criteria import LARGEST_JRC, REGRESSIONS, SAMPLE_LENGTH, scaled_roughness
 
 OUTSIDE = "outside 0 to 20, the scale of standard profiles, it is an extrapolation (see scale_position)"
 STRAIGHT = "NaN where the profiles are straight lines: the regression takes the logarithm of their slope"
@@ -168,10 +145,10 @@ def roughness_coefficient(
             used, azimuth = math.hypot(y, x), math.degrees(math.atan2(y, x)) % 360.0
             slope, of_profiles = _profile_slopes(heights, grid, cells)
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / used)))
-            rows.append((_coefficient(fitted, slope), slope, used, azimuth, fitted.interval))
+            rows.append((fitted.coefficient(slope), slope, used, azimuth, fitted.interval))
             # JRC grows with Z2: the quantiles correspond. Below 20 profiles the low one is beyond all but one
             if of_profiles.size >= 20:
-                limits[:, i] = _coefficient(fitted, np.quantile(of_profiles, (0.025, 0.975)))
+                limits[:, i] = fitted.coefficient(np.quantile(of_profiles, (0.025, 0.975)))
             expected = f"heights {interval:g} m apart towards {towards.name}"
             problems.require(math.isfinite(slope), "surface", expected, NONE)
     coefficient, slopes, lags, azimuths, intervals = np.transpose(rows)
@@ -208,12 +185,6 @@ def _direction_or_default(direction: Any, surface: xr.DataArray) -> Any:
 
 def _lag_or_default(lag: float | None, regression: str) -> float:
     return REGRESSIONS[regression][0].interval if lag is None else float(lag)
-
-
-def _coefficient(law: Regression, slope: Any) -> Any:
-    """Return JRC of a slope or of several; minus infinity for a slope of 0 under a logarithm."""
-    with np.errstate(divide="ignore"):
-        return law.offset + law.factor * (np.log10(slope) if law.power is None else slope**law.power)
 
 
 def _add_notes(result: xr.Dataset, tolerance: float = 0.1, largest_turn: float = 5.0) -> None:

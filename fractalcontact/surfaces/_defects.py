@@ -23,25 +23,25 @@ ROUSSEEUW = "Rousseeuw and Croux, Journal of the American Statistical Associatio
 BRIGGS = "Briggs, Machine contouring using minimum curvature, Geophysics 39 (1974) 39-48"
 
 
-def _check_window(problems: Problems) -> None:
+def _check_size(problems: Problems) -> None:
     given = problems.given
     problems.number("threshold", above=0)
     largest = None
     if check_stack(problems, smallest=3, is_map=True):
         largest = min(read_grid(given.surface).shape)
         problems.require(bool(np.isfinite(given.surface.values).any()), "surface", "heights", NONE)
-    if problems.integer("window", at_least=3, at_most=largest):
-        problems.require(given.window % 2 == 1, "window", "an odd number of cells")
+    if problems.integer("size", at_least=3, at_most=largest):
+        problems.require(given.size % 2 == 1, "size", "an odd number of cells")
 
 
 @public_result(
     title="Surface without spikes",
     references=ROUSSEEUW,
     achieved_error="exact: the heights that remain are unchanged",
-    check=_check_window,
+    check=_check_size,
     memory=34.0,
 )
-def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -> xr.DataArray:
+def despike(surface: xr.DataArray, *, threshold: float = 6.0, size: int = 5) -> xr.DataArray:
     """Remove isolated outliers from a scan.
 
     Dust, reflections and undercut edges leave single wrong heights in optical scans. Closure and friction
@@ -56,7 +56,7 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -
         Largest distance of a height from the median around it, in robust standard deviations of that
         distance over the whole surface. A sharp edge of a rough surface may exceed it too: look at the
         removed points, and test whether the results depend on them.
-    window : int
+    size : int
         Odd edge, in cells, of the square whose median is taken; 3 or more. It removes spikes up to half as
         wide.
 
@@ -85,21 +85,21 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, window: int = 5) -
     (1, True)
     """
     heights = np.asarray(surface.values, dtype=np.float64)
-    is_spike, deviation = _spikes(heights, int(window), float(threshold))
+    is_spike, deviation = _spikes(heights, int(size), float(threshold))
     count = int(is_spike.sum())
     result = with_heights(surface, np.where(is_spike, np.nan, heights)).assign_coords(removed_points=count)
     result.attrs = {"removed_points": count, "robust_standard_deviation": deviation}
     return result
 
 
-def _spikes(heights: Array, window: int, threshold: float) -> tuple[Array, float]:
+def _spikes(heights: Array, size: int, threshold: float) -> tuple[Array, float]:
     """Return the mask of the spikes and the robust standard deviation of the residual.
 
     Parameters
     ----------
     heights : ndarray, shape (ny, nx)
         NaN where missing.
-    window : int
+    size : int
         Odd edge of the square, in cells, whose median a point is compared with.
     threshold : float
         In robust standard deviations.
@@ -112,22 +112,22 @@ def _spikes(heights: Array, window: int, threshold: float) -> tuple[Array, float
     # without this a slope would flag the points beside a missing one
     heights = detrended(heights, 1)[0]
     flagged = np.zeros(heights.shape, dtype=bool)
-    residual = np.abs(heights - _medians(heights, window))
+    residual = np.abs(heights - _medians(heights, size))
     # of a Gaussian, from a quantile; the median called a third of a coin and of heights of a few steps spikes
     deviation = 0.6080 * float(np.nanquantile(residual, 0.9))
     while deviation > 0 and (new := (residual > threshold * deviation) & ~flagged).any():
         flagged |= new
-        residual = np.abs(heights - _medians(np.where(flagged, np.nan, heights), window))
+        residual = np.abs(heights - _medians(np.where(flagged, np.nan, heights), size))
     return flagged, deviation
 
 
-def _medians(heights: Array, window: int) -> Array:
+def _medians(heights: Array, size: int) -> Array:
     """Return the median of the square about every point; the edge is padded by odd reflection."""
-    half = window // 2
+    half = size // 2
     padded = np.pad(heights, half, mode="reflect", reflect_type="odd")
     medians = np.empty(heights.shape)
     for i in range(heights.shape[0]):  # row by row, to bound the memory
-        band = np.lib.stride_tricks.sliding_window_view(padded[i : i + window], window, axis=1)
+        band = np.lib.stride_tricks.sliding_window_view(padded[i : i + size], size, axis=1)
         medians[i] = _row_medians(np.moveaxis(band, 0, 1).reshape(heights.shape[1], -1))
     return medians
 

@@ -76,7 +76,7 @@ def level(surface: xr.DataArray, order: int = 1) -> xr.DataArray:
 def _check_cutoff(problems: Problems) -> None:
     given = problems.given
     is_valid = check_stack(problems)
-    problems.choice("keep", among=("long", "short"))
+    problems.choice("waves", among=("long", "short"))
     if problems.number("cutoff", above=0) and is_valid:
         grid = read_grid(given.surface, core_dims(given.surface))
         # a shorter kernel has too few points for its transmission: see the achieved error
@@ -92,7 +92,7 @@ def _check_cutoff(problems: Problems) -> None:
     check=_check_cutoff,
     memory=42.0,
 )
-def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long") -> xr.DataArray:
+def gaussian_filter(surface: xr.DataArray, cutoff: float, *, waves: str = "long") -> xr.DataArray:
     """Keep the wavelengths beyond a cutoff, or those below it, with the Gaussian filter of ISO 16610.
 
     Parameters
@@ -101,7 +101,7 @@ def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long")
         Heights in metres, dims (..., y, x) or (..., x). Missing points (NaN) have no weight and stay missing.
     cutoff : float
         Wavelength in m at which half the amplitude passes (nesting index); at least four spacings.
-    keep : {"long", "short"}
+    waves : {"long", "short"}
         "long" returns the weighted mean, as an S-filter of ISO 25178-3 that removes short waves, or the
         waviness; "short" returns the heights less that mean, as an L-filter, or the roughness.
 
@@ -137,7 +137,7 @@ def gaussian_filter(surface: xr.DataArray, cutoff: float, *, keep: str = "long")
     grid = read_grid(surface, core_dims(surface))
     stack = height_stack(surface)
     long = np.stack([weighted_mean(each, float(cutoff), grid.spacing, grid.periodic) for each in stack])
-    return with_heights(surface, long if keep == "long" else stack - long)
+    return with_heights(surface, long if waves == "long" else stack - long)
 
 
 def weighted_mean(heights: Array, cutoff: float, spacing: Sequence[float], periodic: Sequence[bool]) -> Array:

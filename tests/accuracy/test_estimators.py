@@ -102,7 +102,7 @@ def test_wrong_arguments_are_all_named():
 @pytest.mark.parametrize(("family", "n"), [("crop", 48), ("profile", 256)])
 def test_blurred_and_noisy_members_of_a_family(family, n, members):
     """Blur of a whole spacing is in the model: the interval is that of the longer waves."""
-    options = {"methods": "likelihood", "members": members, "noise": 0.02, "rng": 3}
+    options = {"methods": "likelihood", "members": members, "relative_noise": 0.02, "rng": 3}
     sharp, wide = (fc.accuracy.estimators(0.5, n, family, blur=b, **options).squeeze() for b in (0.0, 1.0))
     assert wide["least_error"] > 1.5 * sharp["least_error"]
     assert abs(sharp["bias"]) < 0.1
@@ -146,12 +146,12 @@ def test_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
 
     monkeypatch.setattr(fc.dimensions, "estimate", stopping)
     with pytest.raises(KeyboardInterrupt):
-        fc.accuracy.estimators(**CASES, keep=file)
+        fc.accuracy.estimators(**CASES, file=file)
     part = fc.open(file)
     assert np.isfinite(part["least_error"]).sum() == 2
     assert "stopped" in part["rms_error"].attrs["reason"]
     monkeypatch.setattr(fc.dimensions, "estimate", counting)
-    finished = fc.accuracy.estimators(**CASES, keep=file)
+    finished = fc.accuracy.estimators(**CASES, file=file)
     assert estimated == [16, 16, 20, 20]
     assert fc.open(file).drop_vars("run_time").equals(finished.drop_vars("run_time"))
     stream = json.loads(finished.attrs["provenance"])["random"]
@@ -161,13 +161,13 @@ def test_stopped_run_continues_where_it_was(tmp_path, monkeypatch):
 
 def test_file_of_another_call_is_not_continued(tmp_path):
     file = tmp_path / "bench.nc"
-    table = fc.accuracy.estimators(**CASES, rng=1, keep=file)
+    table = fc.accuracy.estimators(**CASES, rng=1, file=file)
     table["least_error"][0, 0, 0] = np.nan
     table["bias"][:] = 99.0
     for other in ({"rng": 2}, {"members": 5}, {"hurst": (0.3, 0.6)}):
         fc.save(table, file)
-        assert float(abs(fc.accuracy.estimators(**CASES | other, keep=file)["bias"]).max()) < 1.0
+        assert float(abs(fc.accuracy.estimators(**CASES | other, file=file)["bias"]).max()) < 1.0
     file.write_text("no table")
-    assert np.isfinite(fc.accuracy.estimators(**CASES, keep=file)["bias"]).all()
-    with pytest.raises(InvalidInput, match=r"keep: expected a file name that ends in '\.nc'"):
-        fc.accuracy.estimators(**CASES, keep=tmp_path / "bench.txt")
+    assert np.isfinite(fc.accuracy.estimators(**CASES, file=file)["bias"]).all()
+    with pytest.raises(InvalidInput, match=r"file: expected a file name that ends in '\.nc'"):
+        fc.accuracy.estimators(**CASES, file=tmp_path / "bench.txt")

@@ -66,7 +66,7 @@ def test_free_surface_is_tapered_and_levelled(rough):
     tilted = rough.copy(data=rough.values + 0.5 * np.arange(40) * 1e-3)
     first, second = fc.dimensions.spectrum(rough), fc.dimensions.spectrum(tilted)
     np.testing.assert_allclose(second.power_spectral_density, first.power_spectral_density, rtol=1e-8)
-    bare = fc.dimensions.spectrum(rough, window=None)
+    bare = fc.dimensions.spectrum(rough, taper=None)
     assert not np.allclose(bare.power_spectral_density, first.power_spectral_density, rtol=0.1, atol=0)
 
 

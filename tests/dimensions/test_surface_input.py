@@ -73,8 +73,8 @@ def test_a_method_that_needs_all_heights_is_refused_for_a_huge_dask_array():
 
 
 def test_invalid_arguments_of_curves(rough):
-    with pytest.raises(ValueError, match=r"window.*\n.*tile") as caught:
-        fc.dimensions.spectrum(rough, window="boxcar", tile=4)
+    with pytest.raises(ValueError, match=r"taper.*\n.*tile") as caught:
+        fc.dimensions.spectrum(rough, taper="boxcar", tile=4)
     assert "2 problems" in str(caught.value)
     with pytest.raises(ValueError, match=r"surface: expected finite values.*fill"):
         fc.dimensions.spectrum(rough.where(rough > rough.mean()))

@@ -29,7 +29,7 @@ def test_wide_spike_is_removed_from_its_edge_inwards(surface):
     spiked = surface.copy(deep=True)
     spiked.values[50:53, 40:43] += 3e-3
     spiked.values[70, 10] = np.nan
-    removed = np.isnan(fc.surfaces.despike(spiked, window=7).values)
+    removed = np.isnan(fc.surfaces.despike(spiked, size=7).values)
     assert removed[50:53, 40:43].all()
     assert removed[70, 10]
 
@@ -46,8 +46,8 @@ def test_slope_is_not_removed_and_units_do_not_matter(surface):
 
 
 def test_invalid_arguments_are_refused(surface):
-    with pytest.raises(ValueError, match=r"(?s)threshold.*window"):
-        fc.surfaces.despike(surface, threshold=0.0, window=4)
+    with pytest.raises(ValueError, match=r"(?s)threshold.*size"):
+        fc.surfaces.despike(surface, threshold=0.0, size=4)
     with pytest.raises(ValueError, match="infinite"):
         fc.surfaces.despike(surface.where(surface > surface.min(), np.inf))
     with pytest.raises(ValueError, match="surface: expected heights"):

@@ -46,7 +46,7 @@ def test_stated_error_holds_from_four_spacings_on(cutoff, period):
 
 def test_long_and_short_add_up():
     rough = fc.surfaces.fbm((40, 50), 1e-6, hurst=0.5, rms_increment=1e-7, rng=1)
-    long, short = (fc.surfaces.gaussian_filter(rough, CUTOFF, keep=keep) for keep in ("long", "short"))
+    long, short = (fc.surfaces.gaussian_filter(rough, CUTOFF, waves=waves) for waves in ("long", "short"))
     np.testing.assert_allclose((long + short).values, rough.values, rtol=0, atol=1e-20)
 
 
