@@ -96,7 +96,9 @@ REGRESSIONS = {
 
 # Shear strength
 
-LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
+LARGEST_ANGLE = (
+    70.0  # degree: Barton's limit of the total friction angle; no rock joint has been tested beyond
+)
 # degree: JRC = 3.95 t^0.7 - 7.98 of the dip t = theta_max/(C+1) is 0, the smoothest of the standard profiles
 # (Tatone and Grasselli 2010); t is the mean dip where the law of the facets is exact
 SMALLEST_DIP = (7.98 / 3.95) ** (1 / 0.7)
@@ -279,7 +281,8 @@ def xia(pressure: Array, joint: Joint) -> tuple[Array, Array]:
     strength = pressure * np.tan(np.radians(np.where(possible, angle, np.nan)))
     # A0 of the joints of Xia et al. is near one half. The factor 4 A0 is 2 there and 20 % off at the bounds;
     # on saw teeth of A0 = .77 the criterion gives 77 degrees where Patton has 35.
-    return strength, _by_facets(pressure, joint) & possible & (0.4 <= joint.area_fraction <= 0.6)
+    inside = possible & (angle <= LARGEST_ANGLE) & (0.4 <= joint.area_fraction <= 0.6)
+    return strength, _by_facets(pressure, joint) & inside
 
 
 def _by_facets(pressure: Array, joint: Joint) -> Array:

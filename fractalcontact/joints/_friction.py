@@ -30,7 +30,7 @@ UNRESOLVED = "NaN where the shears do not resolve the distance: a step of shear 
 PEAKS = ("peak_friction_angle", "peak_shear_strength", "secant_friction_angle", "secant_shear_strength")
 PEAK_SHEARS = ("peak_shear", "peak_strength_shear")
 NOT_KNOWN = (
-    "depends on the distance in a way that is not known: the shears resolve one only, or the faces lock"
+    "depends on the distance in a way that is not known: no half of it is resolved there, or faces lock"
 )
 ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
 PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
@@ -305,17 +305,22 @@ def _shears(curve: xr.DataArray | xr.Dataset) -> Array:
 def _dependence(secants: xr.DataArray, negligible: float = 1.0) -> str:
     """Return how the peak depends on the distance, from the two shortest that the shears resolve.
 
-    A change of so many degrees is as good as none, a choice: friction angles are quoted in whole degrees.
+    Of a peak whose half distance the shears do not resolve, as before a long first step, nothing is known. A
+    change of so many degrees is as good as none, a choice: friction angles are quoted in whole degrees.
     """
     greatest = secants.max("shear").transpose("distance", ...)
-    peaks = greatest.where(greatest < 90.0).values.reshape(greatest.sizes["distance"], -1)
-    resolved = np.flatnonzero(np.isfinite(greatest.values.reshape(peaks.shape)).any(axis=1))[:2]
-    change = np.abs(np.diff(peaks[resolved], axis=0))
-    if not np.isfinite(change).any():
+    is_resolved = np.isfinite(greatest.values.reshape(greatest.sizes["distance"], -1)).any(axis=1)
+    if np.count_nonzero(is_resolved) < 2:
         return NOT_KNOWN
-    words = f"{np.nanmax(change):.3g} degree when the distance is halved to"
-    words += f" {quantity_text(float(secants['distance'][resolved[0]]), 'm')}"
-    if np.nanmax(change) <= negligible:
+    half, whole = (secants.isel(distance=k, drop=True) for k in np.flatnonzero(is_resolved)[:2])
+    place = whole.fillna(-np.inf).argmax("shear")
+    peaks = [each.max("shear").where(lambda peak: peak < 90.0) for each in (half, whole)]
+    change = float(abs(peaks[1] - peaks[0]).where(half.isel(shear=place).notnull()).max())
+    if not np.isfinite(change):
+        return NOT_KNOWN
+    words = f"{change:.3g} degree when the distance is halved to"
+    words += f" {quantity_text(float(secants['distance'][is_resolved][0]), 'm')}"
+    if change <= negligible:
         return f"changes by at most {words}"
     limit = (
         "the shears resolve no further halving: no limit is reached; compare only peaks over equal distances"

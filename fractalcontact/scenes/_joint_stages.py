@@ -92,7 +92,7 @@ def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     if not known.any():
         return
     if comment := data["peak_friction_angle"].attrs.get("comment"):
-        change = _strength_over_half(data)
+        change = _strength_over_half(data) if comment.startswith("changes") else None
         strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
         yield f"The peak friction angle {comment}.{strength}"
     if found := tree.attrs.get("energy_form"):

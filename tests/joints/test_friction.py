@@ -172,6 +172,19 @@ def test_dependence_of_the_peak_on_the_distance():
     assert "not known" in two.peak_friction_angle.attrs["comment"]
 
 
+def test_dependence_of_a_peak_in_a_long_first_step_is_not_known():
+    """Half of the distance is resolved later only, where the opening is nearly straight."""
+    shears = np.array([0.0, 2.0, 3.0, 4.0, 5.0])
+    coarse = fc.joints.friction(curve(shears, 0.1 * shears**0.6), distance=2.0)
+    assert coarse.peak_shear.item() == 0.0
+    assert "not known" in coarse.peak_friction_angle.attrs["comment"]
+    fine = np.arange(6.0)
+    known = fc.joints.friction(curve(fine, 0.1 * fine**0.6), distance=2.0)
+    np.testing.assert_allclose(known.peak_friction_angle, coarse.peak_friction_angle)
+    first, whole = (np.degrees(np.arctan(0.1 * v**0.6 / v)) for v in (1.0, 2.0))
+    assert f"{first - whole:.3g} degree" in known.peak_friction_angle.attrs["comment"]
+
+
 def test_peak_strength_over_distances():
     opening = fractal_curve(1e-5)
     result = fc.joints.friction(opening, distance=1.6e-4, nominal_pressure=[1e6, 2e6])

@@ -315,3 +315,19 @@ def test_a_plane_has_the_basic_strength(make_face):
 def test_wrong_arguments_are_named(surface, options, message):
     with pytest.raises(ValueError, match=message):
         fc.joints.strength_envelope(**{"surface": surface} | NEEDED | options)
+
+
+@pytest.mark.parametrize(("dip", "angle", "is_in_range"), [(8.0, 64.0, True), (11.0, 76.0, False)])
+def test_xia_ends_at_the_largest_angle_of_a_joint(make_face, dip, angle, is_in_range):
+    """On teeth of a dip t, A0 = .5 and C = 0 its angle begins at the basic one plus 4 t."""
+    x = np.arange(161)
+    teeth = np.tan(np.radians(dip)) * 5e-4 * np.abs((x + 10) % 20 - 10) * np.ones((12, 1))
+    result = fc.joints.strength_envelope(
+        make_face(teeth, 5e-4),
+        criterion="xia",
+        nominal_pressure=[1e3],
+        wall_strength=1e8,
+        basic_friction_angle=32.0,
+    ).squeeze()
+    assert np.degrees(np.arctan(result.shear_strength / 1e3)) == pytest.approx(angle, abs=0.1)
+    assert bool(result.in_range) == is_in_range
