@@ -151,7 +151,7 @@ def estimators(
     edges = sorted({int(size) for size in np.atleast_1d(sizes).tolist()})
     kinds = word_tuple(families)
     names = word_tuple(methods) or tuple(dimensions.methods())
-    counts = _counts(members, edges)
+    counts = _counts(members, edges, np.atleast_1d(sizes).tolist())
     defects = {"blur": float(blur), "relative_noise": float(relative_noise), "marks": float(marks)}
     table = _empty_table(names, kinds, exponents, edges, counts).assign_coords(defects)
     table, source = _resume(table, file, rng)
@@ -176,11 +176,15 @@ def estimators(
     return _with_reasons(table).assign_attrs(random=entropy)
 
 
-def _counts(members: int | Sequence[int] | None, sizes: Sequence[int]) -> list[int]:
+def _counts(members: int | Sequence[int] | None, edges: Sequence[int], given: Sequence[int]) -> list[int]:
+    """Return the surfaces of each edge; `members` are in the order of the sizes as `given`."""
     if members is None:
-        return [max(10, 25600 // size) for size in sizes]  # coverage to within 1, 2, 4 % at 64, 256, 1024
+        return [max(10, 25600 // size) for size in edges]  # coverage to within 1, 2, 4 % at 64, 256, 1024
     counts = [int(count) for count in np.atleast_1d(members).tolist()]
-    return counts if len(counts) == len(sizes) else counts[:1] * len(sizes)
+    if len(counts) == 1:
+        return counts * len(edges)
+    order = list(dict.fromkeys(int(size) for size in given))  # without repetitions
+    return [counts[order.index(size)] for size in edges]
 
 
 def _brownian(axes: int, hurst: float, _: int, wide: int, count: int, stream: Stream) -> xr.DataArray:

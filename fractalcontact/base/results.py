@@ -305,7 +305,8 @@ _NAMES: dict[str, tuple[str, ...]] = {
     "NaN where a value is not positive, or stands alone": (
         *("box_local_slope", "minkowski_local_slope", "correlation_local_slope"),
     ),
-    "NaN where the heights of a face do not vary": ("correlation",),
+    "NaN beyond the travel towards a direction": ("structure_function",),
+    "NaN beyond the travel towards a direction, or where the heights of a face do not vary": ("correlation",),
     "NaN where periodic bodies stick everywhere: they move together as rigid bodies": (
         "tangential_stiffness",
     ),

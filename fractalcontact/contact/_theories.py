@@ -107,8 +107,8 @@ def theories(
 
     The moments are sums over all modes of the spectrum: m0 the mean square height, m2 half the mean square
     gradient, m4 3/8 of the mean square Laplacian. A surface that is not periodic along both axes is first
-    levelled by its least-squares plane, and tapered (Hann) along its free axes; m4 then, and so
-    greenwood_williamson, depends most on the spacing and on noise.
+    levelled by its least-squares plane, which has no slope along a periodic axis, and tapered (Hann) along
+    its free axes; m4 then, and so greenwood_williamson, depends most on the spacing and on noise.
 
     Examples
     --------
@@ -174,14 +174,15 @@ def _spectrum(heights: Array, grid: Grid) -> Spectrum:
     unit = power_of_two(max(grid.spacing))
     steps = [step / unit for step in grid.spacing]
     if not all(grid.periodic):
-        values, _ = detrended(values, 1)
+        values, _ = detrended(values, 1, grid.periodic)
     tapers = tuple(None if wraps else "hann" for wraps in grid.periodic)
     psd, weights = spectra.periodogram(values, steps, tapers)
     moments = spectra.spectral_moments(psd, values.shape, steps)
     q = spectra.radial_wavenumber(values.shape, steps)
     extent = [edge / unit for edge in grid.extent]
     square = (psd * weights * q**2).ravel() / math.prod(extent)
-    narrowest = 2 * math.pi / max(extent)
+    # rings of a whole step lump the longest waves: gaps 6 %, stiffnesses 8 % off; 1/64 gives the same to 1e-6
+    narrowest = 2 * math.pi / max(extent) / 8
     ring = np.rint(q.ravel() / narrowest).astype(np.int64)
     slope_square = np.bincount(ring, square)
     filled = slope_square > 0

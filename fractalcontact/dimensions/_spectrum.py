@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -61,8 +61,8 @@ def spectrum(surface: xr.DataArray, *, taper: str | None = "auto", tile: int | N
         Heights in m, dims (..., y, x) or (..., x) for a profile, without gaps.
     taper : "auto", "hann" or None
         Of the free axes (a window function). "auto" is "hann" on free axes and None on periodic ones. With
-        None, the edges of a free surface show as a tail q^-3. A plane is removed first, except where both
-        axes are periodic; there only the mean is.
+        None, the edges of a free surface show as a tail q^-3. A plane is removed first, level along periodic
+        axes.
     tile : int, optional
         Average the spectra of square tiles of this edge in points, overlapping by half (Welch 1967): for
         surfaces that do not fit in memory, or for a smoother curve. Default: the whole surface, of a dask
@@ -126,7 +126,7 @@ def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) 
     total: Array | None = None
     number = 0
     for part in _tiles(surface, tile):
-        heights = without_trend(part, plane=not all(periodic))
+        heights = without_trend(part, (False, *periodic)[-2:])
         power, _ = spectra.periodogram(heights if axes == 2 else heights[0], spacing, tapers)
         total = power if total is None else total + power
         number += 1
@@ -141,16 +141,16 @@ def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) 
     return Curve(q, mean * (surface.unit**2 if tile is None else 1.0), count, has_wavenumbers=True)
 
 
-def without_trend(heights: Array, *, plane: bool) -> Array:
-    """Return complete heights without their mean, or without the least-squares plane."""
+def without_trend(heights: Array, wraps: Sequence[bool]) -> Array:
+    """Return complete heights without their least-squares plane, which is level along an axis that wraps."""
     heights = heights - heights.mean()
-    if not plane:
-        return heights
     ny, nx = heights.shape
     x, y = np.arange(nx) - 0.5 * (nx - 1), np.arange(ny) - 0.5 * (ny - 1)
+    wraps_y, wraps_x = wraps
     # on a full rectangle the two slopes are independent
-    tilt = np.sum(heights.sum(axis=0) * x) / (ny * np.sum(x * x)) * x
-    rise = np.sum(heights.sum(axis=1) * y) / (nx * np.sum(y * y)) * y if ny > 1 else np.zeros(1)
+    tilt = np.zeros(1) if wraps_x else np.sum(heights.sum(axis=0) * x) / (ny * np.sum(x * x)) * x
+    is_level = wraps_y or ny == 1
+    rise = np.zeros(1) if is_level else np.sum(heights.sum(axis=1) * y) / (nx * np.sum(y * y)) * y
     return np.asarray(heights - tilt - rise[:, None])
 
 

@@ -147,7 +147,7 @@ def without_waves(
     found, rest = find_waves(surface)
     if not found:
         return surface, ""
-    before = without_trend(surface.heights, plane=not all(surface.grid.periodic))
+    before = without_trend(surface.heights, [all(surface.grid.periodic)] * 2)
     left = _mean_square_increment(rest) / _mean_square_increment(before)
     sets = _sets(found, surface.shape)
     if left < (few_left if len(sets) > few else none_left) or _is_progression(found, few):
@@ -197,12 +197,12 @@ def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
     crop = middle_slices(shape, LARGEST_CROP)
     is_part = max(shape) > LARGEST_CROP
     is_periodic = all(surface.grid.periodic) and not is_part
-    part = without_trend(surface.heights[crop], plane=not is_periodic)
+    part = without_trend(surface.heights[crop], [is_periodic] * 2)
     search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
     peaks = [] if surface.is_enlarged else search.peaks(part)
     if not peaks:
         return [], surface.heights
-    rest = without_trend(surface.heights, plane=not is_periodic)
+    rest = without_trend(surface.heights, [is_periodic] * 2)
     part = rest[crop]  # a view: it changes with the rest
     found: list[Wave] = []
     for _ in range(MOST):

@@ -49,7 +49,8 @@ def _check(problems: Problems) -> None:
         return
     valid = [check_crack(problems), check_directions(problems)]
     if all(valid):
-        slides = _whole_cell_shears(given.crack, read_directions(given.direction)).size > 1
+        directions = read_directions(given.direction)
+        slides = all(_whole_cell_shears(given.crack, towards).size > 1 for towards in directions)
         expected = "a block smaller than its face, or periodic faces"
         problems.require(slides, "crack", expected, given.crack.layout.cells)
 
@@ -77,16 +78,17 @@ def decorrelation_length(
     direction : str, float, or a sequence of them
         Directions in which the block slides: compass words, or degrees anticlockwise from E.
     shear : sequence of float, optional
-        Shears (m), ascending from 0. None: whole cells up to the greatest travel (half the face where it
-        wraps); all of them up to 128, otherwise 128 in geometric steps.
+        Shears (m), ascending from 0. None: of each direction whole cells up to its travel (half the face
+        where it wraps); all of them up to 128, otherwise 128 in geometric steps.
 
     Returns
     -------
     Dataset
-        correlation and structure_function (m2, the variance of the delta-surface) over (direction, shear);
-        decorrelation_length (m) over direction, NaN where the faces are still correlated at the greatest
-        shear; decorrelation_length_low and _high, its 95 % interval, NaN where the block is less than 15
-        lengths wide and holds too few independent parts; missing_reason; run_time (s).
+        correlation and structure_function (m2, the variance of the delta-surface) over (direction, shear),
+        NaN beyond the travel of a direction; decorrelation_length (m) over direction, NaN where the faces are
+        still correlated at the greatest shear; decorrelation_length_low and _high, its 95 % interval, NaN
+        where the block is less than 15 lengths wide and holds too few independent parts; missing_reason;
+        run_time (s).
 
     Raises
     ------
@@ -115,13 +117,20 @@ def decorrelation_length(
     15.2
     """
     directions = read_directions(direction)
-    shears = _whole_cell_shears(crack, directions) if shear is None else float_array(shear)
+    given = None if shear is None else float_array(shear)
+    own = [_whole_cell_shears(crack, towards) if given is None else given for towards in directions]
+    shears = np.unique(np.concatenate(own))
     rows: list[dict[str, Any]] = []
-    for towards in directions:
-        sums, variance = _crack_sums(crack, shears, towards)
+    for towards, those in zip(directions, own, strict=True):
+        within = int(np.searchsorted(shears, those[-1])) + 1
+        sums, variance = _crack_sums(crack, shears[:within], towards)
+        beyond = np.full(shears.size - within, np.nan)
         correlation = tile_correlation(sums, np.ones(sums[0].shape[1]))
-        length = estimate_length(sums, shears, min(crack.block))
-        rows.append({"correlation": correlation, "structure_function": variance} | length._asdict())
+        # from its own shears, so that no length depends on the directions beside it
+        at = np.searchsorted(shears, those)
+        length = estimate_length((sums[0][at], sums[1][at], sums[2][at]), those, min(crack.block))
+        curves = {"correlation": correlation, "structure_function": variance}
+        rows.append({name: np.append(curve, beyond) for name, curve in curves.items()} | length._asdict())
     result = xr.Dataset(
         {name: (("direction", "shear")[: values.ndim], values) for name, values in stacked(rows).items()},
         coords={"shear": ("shear", shears), **direction_coords(directions)},
@@ -135,16 +144,16 @@ def decorrelation_length(
     return result
 
 
-def _whole_cell_shears(crack: Crack, directions: Sequence[Direction], most: int = 128) -> Array:
-    """Return 0 and at most so many whole-cell shears up to the least travel of the directions.
+def _whole_cell_shears(crack: Crack, towards: Direction, most: int = 128) -> Array:
+    """Return 0 and at most so many whole-cell shears up to the travel towards a direction.
 
     With 64 and 256 of them no length on eight faces of 400 x 400 points changed.
     """
-    layout = crack.layout
-    step = min(layout.spacing)
-    travel = min(layout.travel(towards.unit) for towards in directions)
-    if math.isinf(travel):
-        travel = 0.5 * min(n * s for n, s in zip(layout.face_cells, layout.spacing, strict=True))
+    layout, axis = crack.layout, int(np.argmax(np.abs(towards.unit)))
+    step = layout.spacing[axis]
+    travel = layout.travel(towards.unit)
+    if math.isinf(travel):  # half the face, along the axis that the block moves on most
+        travel = 0.5 * layout.face_cells[axis] * step
     cells = math.floor(travel / step * ROUNDED)
     if cells <= most:
         return np.arange(cells + 1) * step

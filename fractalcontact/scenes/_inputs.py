@@ -80,11 +80,12 @@ def _points(count: Any) -> str:
 
 
 def plane_share(surface: xr.DataArray) -> float:
-    """Return the part of the mean square height that the mean plane carries."""
+    """Return the part of the mean square height that the mean plane carries, level along periodic axes."""
     total = float(surface.std())
     if not total > 0:
         return 0.0
-    slope_y, slope_x = slopes(surface.values, read_grid(surface).spacing)
+    grid = read_grid(surface)
+    slope_y, slope_x = slopes(surface.values, grid.spacing, grid.periodic)
     plane = slope_y * surface["y"] + slope_x * surface["x"] + 0.0 * surface
     return (float(plane.std()) / total) ** 2
 

@@ -113,7 +113,7 @@ def describe(surface: xr.DataArray) -> xr.Dataset:
     grid = read_grid(surface, core_dims(surface))
     if has_blocks(surface):
         places = np.ndindex(*surface.shape[: surface.ndim - len(grid.shape)])
-        rows = [_statistics_in_blocks(surface[place], grid.spacing) for place in places]
+        rows = [_statistics_in_blocks(surface[place], grid.spacing, grid.periodic) for place in places]
     else:
         stack = np.asarray(surface.values, dtype=np.float64).reshape(-1, *grid.shape)
         rows = [_statistics(heights, grid.spacing, grid.periodic) for heights in stack]
@@ -163,7 +163,9 @@ def _statistics(heights: Array, spacing: Sequence[float], periodic: Sequence[boo
     return result | _gradients(neighbours, slopes, result["rms_height"], scale, unit, by_modes)
 
 
-def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> dict[str, float]:
+def _statistics_in_blocks(
+    surface: xr.DataArray, spacing: Sequence[float], periodic: Sequence[bool]
+) -> dict[str, float]:
     """Return the statistics of a plane or a profile of dask, from one row of blocks at a time."""
     axes, ny, nx = surface.ndim, (1, *surface.shape)[-2], surface.shape[-1]
     low, high, origin, total, size, infinite = math.inf, -math.inf, math.nan, 0.0, 0, 0
@@ -181,7 +183,8 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
     mean, (unit, steps) = (total / size + (origin - low)) / scale, _scaled_steps(spacing)
     x, half = np.linspace(-1.0, 1.0, nx), 0.5 * max(ny - 1, 1)
     powers, gram, right, sums = np.zeros(4), np.zeros((3, 3)), np.zeros(3), np.zeros((axes + 2, 2))
-    before = np.empty((0, nx))
+    closes, along = axes == 2 and periodic[0], (False, periodic[-1])[2 - axes :]
+    before = top = np.empty((0, nx))
     for block, start in _row_blocks(surface):
         block -= low
         block /= scale
@@ -193,11 +196,12 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
             # a slope along y needs the row before, the Laplacian two: what lies in these alone was counted
             joined = np.concatenate([before, values])
             if axes == 1:
-                sums += _neighbours(values[0], steps, (False,), scale / unit)
+                sums += _neighbours(values[0], steps, along, scale / unit)
             else:
-                sums += _neighbours(joined, steps, (False, False), scale / unit)
+                sums += _neighbours(joined, steps, along, scale / unit)
                 if len(before):
-                    sums -= _neighbours(before, steps, (False, False), scale / unit)
+                    sums -= _neighbours(before, steps, along, scale / unit)
+            top = np.concatenate([top, values])[:2]
             before = joined[-2:].copy()
             # least-squares plane of 1, x and y
             filled = np.where(is_known, values, 0.0)
@@ -209,6 +213,9 @@ def _statistics_in_blocks(surface: xr.DataArray, spacing: Sequence[float]) -> di
                 [y @ ones, y @ ax, (y * y) @ ones],
             ]
             right += filled.sum(), (filled @ x).sum(), y @ filled.sum(axis=1)
+    if closes:  # the last rows and the first ones are neighbours, too
+        for rows_of, sign in ((np.concatenate([before, top]), 1), (before, -1), (top, -1)):
+            sums += sign * np.array(_neighbours(rows_of, steps, along, scale / unit))
     result = _heights(powers, size, mean, (0.0, (high - low) / scale), low, scale)
     result["missing_points"] = surface.size - size
     gram, right = gram[: axes + 1, : axes + 1], right[: axes + 1]

@@ -171,3 +171,9 @@ def test_file_of_another_call_is_not_continued(tmp_path):
     assert np.isfinite(fc.accuracy.estimators(**CASES, file=file)["bias"]).all()
     with pytest.raises(InvalidInput, match=r"file: expected a file name that ends in '\.nc'"):
         fc.accuracy.estimators(**CASES, file=tmp_path / "bench.txt")
+
+
+def test_members_follow_the_sizes_as_they_are_given():
+    table = fc.accuracy.estimators(0.5, (32, 16), "fbm", "increments", members=(2, 3), rng=1)
+    assert table["size"].values.tolist() == [16, 32]
+    assert table["member_count"].values.tolist() == [3, 2]

@@ -325,3 +325,24 @@ def test_asperities_hold_up_to_a_twentieth_of_the_area(name):
     found = theories(rough(), MODULUS * np.linspace(5e-4, 5e-3, 200)).contact_fraction.sel(theory=name)
     assert 0.049 < float(found.max()) <= 0.05
     assert found.isnull().any()
+
+
+@pytest.mark.parametrize("shift", [0, 16])
+def test_a_wave_along_a_periodic_axis_keeps_its_moments(shift):
+    """A plane through one period of a wave has a slope; the periodic axis has none."""
+    heights = np.roll(1e-6 * np.sin(2 * math.pi * np.arange(CELLS) / CELLS), shift)
+    surface = fc.surfaces.from_array(
+        heights[:, None] * np.ones((1, CELLS)), SIDE / CELLS, periodic=(True, False)
+    )
+    result, q = theories(surface, 1e5), 2 * math.pi / SIDE
+    assert float(result.m0) == pytest.approx(0.5e-12, rel=1e-3)
+    assert float(result.m2) == pytest.approx(0.25e-12 * q**2 * 4 / 3, rel=1e-3)  # a third is the Hann taper
+
+
+def test_persson_does_not_change_where_a_surface_is_repeated():
+    """The same waves on a patch of two periods: gap and stiffness took the longest ones in rings."""
+    surface = rough()
+    twice = fc.surfaces.from_array(np.tile(surface.values, (2, 2)), SIDE / CELLS, periodic=True)
+    once, repeated = (theories(each, [1e6, 1e7]).sel(theory="persson") for each in (surface, twice))
+    for name in ("contact_fraction", "mean_gap", "interface_stiffness"):
+        np.testing.assert_allclose(repeated[name], once[name], rtol=1e-4, err_msg=name)

@@ -90,3 +90,11 @@ def test_scatter_equals_stated_error():
     ratio = values.std("member") / values.mean("member") / np.sqrt(2 / curve.mode_count)
     assert float(ratio.mean()) == pytest.approx(1.0, abs=0.03)
     assert "sqrt(2 / mode_count)" in curve.attrs["provenance"]
+
+
+@pytest.mark.parametrize("shift", [0, 8])
+def test_a_wave_along_a_periodic_axis_keeps_its_power(shift):
+    heights = np.roll(np.sin(2 * np.pi * np.arange(32) / 32), shift)[:, None] * np.ones((1, 64))
+    curve = fc.dimensions.spectrum(surface_of(heights, periodic=(True, False)), taper=None)
+    total = float((curve.power_spectral_density * curve.mode_count).sum()) / (32 * 64 * 1e-6)
+    assert total == pytest.approx(0.5, rel=1e-9)

@@ -50,6 +50,30 @@ def test_a_tilt_across_a_periodic_axis_changes_nothing(make_face):
     assert tilted.decorrelation_length.item() == pytest.approx(level.decorrelation_length.item(), rel=1e-9)
 
 
+@pytest.mark.parametrize("alone", ["E", "N"])
+def test_a_length_does_not_depend_on_the_directions_beside_it(make_face, alone):
+    heights = correlated(96, 3.0, 2)[0][:40]
+    crack = fc.joints.Crack(make_face(heights), block=32, **MATERIAL)
+    together = fc.joints.decorrelation_length(crack, direction=["E", "N"])
+    one = fc.joints.decorrelation_length(crack, direction=alone).squeeze()
+    ours = together.sel(direction=alone)
+    np.testing.assert_array_equal(ours.decorrelation_length, one.decorrelation_length)
+    np.testing.assert_allclose(ours.correlation.sel(shear=one.shear), one.correlation, atol=1e-12)
+    # the block travels by 32 cells towards E and by 4 towards N
+    assert np.isfinite(together.correlation.sel(direction="E")).sum() == 33
+    assert np.isfinite(together.correlation.sel(direction="N")).sum() == 5
+
+
+def test_a_short_periodic_edge_does_not_limit_the_shears_along_the_long_one(make_face):
+    heights = correlated(512, 3.0, 3)[0][:20]
+    strip = fc.joints.Crack(make_face(heights, periodic=True), **MATERIAL)
+    length = fc.joints.decorrelation_length(strip, direction="E").decorrelation_length.item()
+    centred = heights - heights.mean()
+    power = np.fft.irfft((np.abs(np.fft.rfft(centred, axis=1)) ** 2).sum(axis=0))[:256]
+    k = int(np.argmax(power < power[0] * np.exp(-1)))
+    assert k - 1 <= length <= k
+
+
 def test_block_sums_on_a_free_face(make_face, rough):
     lower, upper = rough((40, 36), 1), rough((40, 36), 2)
     y, x = np.indices(lower.shape)

@@ -270,3 +270,13 @@ def test_infinite_heights_of_a_dask_array_are_refused():
     lazy = fc.surfaces.from_array(da.from_array(heights, chunks=8), 1e-5)
     with pytest.raises(InvalidInput, match="finite heights, or NaN where missing, got 1 infinite"):
         fc.surfaces.describe(lazy)
+
+
+@pytest.mark.parametrize("periodic", [(True, False), (False, True)])
+def test_a_dask_array_goes_on_across_its_periodic_edge(periodic):
+    pytest.importorskip("dask")
+    heights = np.random.default_rng(1).standard_normal((7, 96)) * 1e-6
+    surface = fc.surfaces.from_array(heights, (1e-5, 2e-5), periodic=periodic)
+    whole, blocks = (fc.surfaces.describe(each) for each in (surface, surface.chunk({"x": 30, "y": 3})))
+    for name in set(whole.data_vars) - {"run_time"}:
+        np.testing.assert_allclose(blocks[name], whole[name], rtol=1e-9, atol=1e-12, err_msg=name)
