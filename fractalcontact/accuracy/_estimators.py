@@ -157,7 +157,7 @@ def estimators(
     table, source = _resume(table, file, rng)
     entropy = streams.record(source)
     places = [(k, h, n) for n in range(len(edges)) for k in range(len(kinds)) for h in range(exponents.size)]
-    # every case has a stream of its own, whatever else is asked for in the same run
+    # every case has a stream of its own, by its place in the run
     cases = list(zip(places, source.spawn(len(places)), strict=True))
     for place, stream in track(cases, progress, "estimators", unit="case"):
         if np.isfinite(table["least_error"].values[place]):
