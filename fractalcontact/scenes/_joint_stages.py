@@ -16,7 +16,7 @@ from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_M
 from fractalcontact.scenes._surface_stages import AREAS, SLIP_TABLE, SURFACE
 
 OUTSIDE_SCALE = (
-    "A coefficient outside 0 to 20, the scale of the standard profiles, is extrapolated: it only says that "
+    "JRC outside 0 to 20, the scale of the standard profiles, is extrapolated: it only says that "
     "the face is smoother, or rougher, than all of them."
 )
 
@@ -406,7 +406,7 @@ STAGES = (
         Column("scatter of the profiles", _jrc_scatter),
         Column("read every", "lag", screen=False),
         Column("regression over", "regression_interval", screen=False),
-        remarks=_outside_scale,
+        caveats=_outside_scale,
     ),
     _of_surface(
         "directional_roughness",

@@ -182,7 +182,8 @@ def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> li
         found = [values(state) for state in states]
         if all(item is None for item in found):
             return None
-        return [cell(item, column.decimals) if item is not None else "-" for item in found]
+        scale = _scale_of([item for item in found if isinstance(item, xr.DataArray)])
+        return [cell(item, column.decimals, scale) if item is not None else "-" for item in found]
     if isinstance(values, tuple):
         if not set(values) <= set(data.variables):
             return None
@@ -192,6 +193,14 @@ def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> li
         return None
     scale = column_scale(data[values]) if column.decimals is None and data[values].dtype.kind == "f" else None
     return [cell(state[values], column.decimals, scale) for state in states]
+
+
+def _scale_of(cells: Sequence[xr.DataArray]) -> Scale | None:
+    """Return one unit for the cells of a column that a function takes."""
+    if not cells or any(each.dtype.kind not in "fiu" for each in cells):
+        return None
+    together = np.concatenate([finite(each) for each in cells])
+    return column_scale(xr.DataArray(together, dims="cell", name=cells[0].name, attrs=cells[0].attrs))
 
 
 def cell(value: Any, decimals: int | None, scale: Scale | None = None) -> str:
@@ -237,11 +246,14 @@ def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
 def column_scale(data: Any) -> Scale | None:
     """Return one unit for a column of a table; None, each value its own, where they span three decades.
 
-    A prefix spans so many: in the unit of the greatest value the least would have none of its digits.
+    A prefix spans so many: in the unit of the greatest value the least would have none of its digits. Lengths
+    that are all zero are in millimetres.
     """
     sizes = np.abs(finite(data))
     sizes = sizes[sizes > 0]
-    if sizes.size == 0 or sizes.max() >= 1e3 * sizes.min():
+    if sizes.size == 0:
+        return Scale(1e-3, "mm") if units_of(data.name, data.attrs) == "m" else None
+    if sizes.max() >= 1e3 * sizes.min():
         return None
     return scale_for(units_of(data.name, data.attrs), float(np.median(sizes)))
 

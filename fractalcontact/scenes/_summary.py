@@ -145,38 +145,62 @@ def _fit(one: ResultTable, other: ResultTable) -> bool:
 def _screen_text(whole: Summary, lines: int = 36, most: int = 3) -> str:
     """Return a summary in so many lines: results first, then at most `most` of the caveats.
 
-    A command adds what it has written, 40 lines in all.
+    Where the tables do not fit, caveats are left out before tables, all but the first. A command adds what it
+    has written, 40 lines in all.
     """
     tables = joined_tables([each.selected(each.on_screen) for each in whole.tables if each.on_screen])
-    ends = [note(caveat, indent=0) for caveat in whole.caveats[:most]]
-    left_out = len(whole.caveats) - most
-    ends += [f"caveats left out: {left_out}; {MORE}"] if left_out > 0 else []
     single = [_as_line(each) for each in tables if not each.key_heads]
+    tables = [each for each in tables if each.key_heads]
     head = "\n".join([whole.title, *(note(fact, indent=0) for fact in whole.facts), *single])
-    foot = ["\n".join(ends)] if ends else []
-    left = lines - sum(part.count("\n") + 2 for part in [head, *foot])
-    return "\n\n".join([head, *_fitted([each for each in tables if each.key_heads], left), *foot])
+    for count in range(most, 0, -1):
+        ends = [note(caveat, indent=0) for caveat in whole.caveats[:count]]
+        left_out = len(whole.caveats) - count
+        ends += [f"caveats left out: {left_out}; {MORE}"] if left_out > 0 else []
+        foot = ["\n".join(ends)] if ends else []
+        shown = _fitted(tables, lines + 1 - _height([head, *foot]))  # the last has no empty line
+        if len(shown) == len(tables):
+            break
+    left_out = len(tables) - len(shown)
+    words = [f"tables left out: {left_out}; {MORE}"] if left_out else []
+    return "\n\n".join([head, *shown, *words, *foot])
+
+
+def _height(parts: Iterable[str]) -> int:
+    """Return the lines of parts of a text, with an empty one after each."""
+    return sum(part.count("\n") + 2 for part in parts)
 
 
 def _fitted(tables: Sequence[ResultTable], lines: int) -> list[str]:
-    """Return tables that fit so many lines: the longest loses rows first, then the last are left out."""
-    most = [len(each.keys) for each in tables]
+    """Return tables that fit so many lines: they lose rows first, then the last are left out.
+
+    Those of strength are left out after all others: a scene has them where its user gives the strength of the
+    walls or the friction angle, to ask for them.
+    """
+    kept = list(tables)
+    while kept:
+        words = 2 if len(kept) < len(tables) else 0  # lines of what is said of those left out
+        shown = _thinned(kept, lines - words)
+        if shown:
+            return shown
+        del kept[max(range(len(kept)), key=lambda i: (not _has_strength(kept[i]), i))]
+    return []
+
+
+def _thinned(tables: Sequence[ResultTable], lines: int, fewest: int = 3) -> list[str]:
+    """Return tables in so many lines, the longest with fewer rows; nothing where that is not possible."""
+    rows = [len(each.keys) for each in tables]
     shown = [table(each.rows, rule=False) for each in tables]
+    while _height(shown) > lines:
+        longest = int(np.argmax(rows))
+        if rows[longest] <= fewest:
+            return []
+        rows[longest] -= 1
+        shown[longest] = table(tables[longest].shortened(rows[longest]).rows, rule=False)
+    return shown
 
-    def height() -> int:
-        return sum(text.count("\n") + 2 for text in shown)
 
-    while height() > lines and shown:
-        longest = int(np.argmax(most))
-        if most[longest] > 2:  # the first and the last
-            most[longest] -= 1
-            shown[longest] = table(tables[longest].shortened(most[longest]).rows, rule=False)
-        else:
-            most.pop()
-            shown.pop()
-            lines -= 2 if len(shown) == len(tables) - 1 else 0  # for the words below
-    left_out = len(tables) - len(shown)
-    return [*shown, f"tables left out: {left_out}; {MORE}"] if left_out else shown
+def _has_strength(each: ResultTable) -> bool:
+    return any("strength" in head for head in each.heads)
 
 
 def _as_line(one_row: ResultTable) -> str:
@@ -379,16 +403,19 @@ def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset, least: int = 30)
         return
     greatest = int(np.flatnonzero(unresolved)[-1])
     ends = dict.fromkeys(number(float(end[greatest]), 2) for end in (low, high))
+    cell = "cell" if list(ends) == ["1"] else "cells"
     of_loads = f"{int(unresolved.sum())} of {int(touching.sum())} loads"
     source = "" if "state" in pressed else ", from their perimeter"
     where = "every load" if unresolved.sum() == touching.sum() else of_loads
     ratio = pressed["contact_fraction"] / pressed["corrected_contact_fraction"].where(cells < least) - 1.0
     excess = float(ratio.where(np.isfinite(ratio)).max())
     counted = (
-        f"counted areas are up to {100 * excess:.2g} % above the corrected ones, and " if excess > 0 else ""
+        f"counted areas are up to {number(100 * excess, 2)} % above the corrected ones, and "
+        if excess > 0
+        else ""
     )
     yield (
-        f"{path}: contacts are not resolved at {where} (median island {' to '.join(ends)} cells, {least} "
+        f"{path}: contacts are not resolved at {where} (median island {' to '.join(ends)} {cell}, {least} "
         f"needed{source}): {counted}the shapes and the dimension of islands are those of the grid."
     )
 
@@ -399,12 +426,12 @@ def _true_pressure(tree: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterato
     if "plastic_work" in pressed:  # a hardness limits the pressure
         return
     true = pressed["nominal_pressure"] / pressed["contact_fraction"].where(pressed["contact_fraction"] > 0)
-    low, high = (f"{float(end) / 1e9:.2g}" for end in (true.min(), true.max()))
+    low, high = (number(float(end) / 1e9, 2) for end in (true.min(), true.max()))
     limits = scene_table(tree, "material").get("yield_pressure")
     if limits is not None and float(true.max()) > np.min(limits):
-        span = " to ".join(f"{float(limit) / 1e9:.2g}" for limit in np.atleast_1d(limits))
+        span = " to ".join(number(float(limit) / 1e9, 2) for limit in np.atleast_1d(limits))
         factor = float(true.max()) / float(np.max(limits))
-        times = f", by a factor of up to {factor:.2g}" if factor > 1 else ""
+        times = f", by a factor of up to {number(factor, 2)}" if factor > 1 else ""
         yield (
             f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {span} GPa: "
             f"elastic contact areas are too small{times}; a hardness limits the pressure."
@@ -419,8 +446,8 @@ def _slopes(_: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterator[str]:
     slope = float(pressed["rms_slope"].max())
     if slope > STEEP:
         yield (
-            f"{path}: {PRESSED[path]} has an rms slope of up to {slope:.2g}; beyond {STEEP:g} strains are "
-            "not small, and the closures and areas of linear elasticity are approximations."
+            f"{path}: {PRESSED[path]} has an rms slope of up to {number(slope, 2)}; beyond {STEEP:g} strains "
+            "are not small, and the closures and areas of linear elasticity are approximations."
         )
 
 

@@ -268,6 +268,10 @@ def test_coefficient_beyond_the_standard_profiles_is_told(increment, outside):
     text = remarks(xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc}))
     assert bool((jrc.scale_position != 0).any()) is outside
     assert ("is extrapolated" in text) is outside
+    screen = " ".join(
+        fc.scenes.summary(xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc})).split()
+    )
+    assert ("JRC outside 0 to 20, the scale of the standard profiles, is extrapolated" in screen) is outside
 
 
 def test_many_rows_are_thinned_to_fit_the_screen(monkeypatch):
@@ -355,3 +359,67 @@ def test_slope_of_a_level_face_is_left_out():
     tilted = tree.copy()
     tilted["joints/rigid_dilatancy"] = dilatancy.assign(mean_slope=dilatancy.mean_slope + 0.01)
     assert "+0.0100" in fc.scenes.summary(tilted)
+
+
+def test_hydraulic_apertures_have_one_unit():
+    """Parallel plates carry water as their distance: 234, 238 and 555 µm are one column."""
+    widths = np.array([234e-6, 238e-6, 555e-6])
+    gap = xr.concat([fc.surfaces.from_array(np.full((8, 8), width), 1e-3) for width in widths], "shear")
+    gap = gap.assign_coords(shear=("shear", [0.0, 6e-4, 3e-3], {"units": "m"}))
+    tree = xr.DataTree.from_dict({"joints/transmissivity": fc.joints.transmissivity(gap)})
+    cells = [row["hydraulic (x)"] for row in rows(tree, "aperture")]
+    assert cells == ["234 µm", "238 µm", "555 µm"]
+
+
+def test_zero_lengths_have_a_unit_of_their_size():
+    """The steepest climb begins at once."""
+    surface = fc.surfaces.from_array(np.zeros((16, 32)), 1e-4)
+    crack = fc.joints.Crack(surface, young=30e9, poisson=0.2, block=(8e-4, 8e-4), basic_friction_angle=30)
+    rigid = fc.joints.dilatancy(crack, shear=np.arange(9) * 1e-4, direction="E")
+    rigid["rigid_dilatancy"] = rigid["rigid_dilatancy"].copy(data=[np.sqrt(np.arange(9)) * 1e-5])
+    friction = fc.joints.friction(rigid, distance=2e-4, nominal_pressure=1e6)
+    tree = xr.DataTree.from_dict({"joints/friction": friction})
+    assert rows(tree, "peak shear strength")[0]["from shear"] == "0 mm"
+
+
+def test_numbers_of_caveats_have_no_exponents():
+    surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
+    pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
+    steep = pressed.assign(rms_slope=pressed["rms_slope"].copy(data=560.0))
+    assert "rms slope of up to 560;" in remarks(xr.DataTree.from_dict({"contact": steep}))
+
+
+@pytest.fixture(scope="module")
+def strong_joint():
+    """A joint with the tables of the command `joint --friction-angle --jcs`."""
+    face = fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=6e-5, rng=3)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=4.8e-3, basic_friction_angle=32)
+    pressures = [1e6, 3e6, 10e6]
+    strength = {"wall_strength": 120e6, "basic_friction_angle": 32.0}
+    shear = [0.0, 2e-4, 8e-4, 1.6e-3]
+    names = {
+        "directional_roughness": fc.joints.directional_roughness(face),
+        "roughness_coefficient": fc.joints.roughness_coefficient(face, lag=6e-4),
+        "rigid_dilatancy": fc.joints.dilatancy(crack, shear=shear, direction=["E", "N", "W", "S"]),
+        "closure": fc.joints.closure(crack, shear=shear, nominal_pressure=pressures, direction="E"),
+        "strength_envelope": fc.joints.strength_envelope(face, nominal_pressure=pressures, **strength),
+        "shear_curve": fc.joints.shear_curve(
+            face,
+            displacement=shear,
+            nominal_pressure=pressures,
+            wall_strength=120e6,
+            residual_friction_angle=32,
+        ),
+    }
+    return xr.DataTree.from_dict({f"joints/{name}": result for name, result in names.items()})
+
+
+@pytest.mark.parametrize("columns", [44, 56, 80, 110])
+def test_strength_is_on_the_screen_where_not_all_tables_are(strong_joint, columns, monkeypatch):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    text = fc.scenes.summary(strong_joint)
+    assert len(text.splitlines()) <= 36
+    for name in ("barton_choubey", "xia"):
+        assert name in text
+    assert "1 of " not in text
+    assert "2 of " not in text
