@@ -33,6 +33,7 @@ WHERE = "fractalcontact.surfaces.read"
 NETCDF = (".nc", ".nc4", ".cdf", ".netcdf")
 TABLES = (".csv", ".txt", ".tsv", ".dat", ".asc", *_read_points.ALWAYS_POINTS)
 RASTERS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"ncols", b"NCOLS", b"DSAA", b"DSBB", b"DSRB")
+SPACING_NEEDED = "the spacing in metres (on the command line `--spacing 0.3mm`)"
 IMAGES = (b"\x89PNG", b"\xff\xd8\xff", b"GIF8", b"BM")
 
 
@@ -143,6 +144,9 @@ def read(
         message = f"{source.name}: the file states {stated!r} and is read in {units!r}, the argument `units`"
         warn(message, ScaleWarning)
     _warn_of_scale(surface, source.name)
+    if "gridding" not in surface.attrs:  # the heights of points were looked at before they were gridded
+        unit = units or stated
+        _warn_of_missing(surface.values, source.name, "cells", unit if unit in UNITS else "m")
     surface.attrs = {
         "title": f"Surface read from {source.name}",
         "parameters": {"path": source.name},
@@ -217,7 +221,7 @@ def _instrument_or_table(request: Request, *, is_table: bool = False) -> xr.Data
     except (MissingExtra, UnreadableFile) as error:
         if isinstance(error, UnreadableFile) and not (is_table and UNKNOWN in str(error)):
             raise
-        expected = f"the spacing in metres, for {request.path.name!r} as a table of heights"
+        expected = f"{SPACING_NEEDED}, for {request.path.name!r} as a table of heights"
         raise UnreadableFile("", [f"spacing: expected {expected}, got None"]) from None
 
 
@@ -226,6 +230,7 @@ def _gridded_points(points: xr.Dataset, request: Request) -> xr.DataArray:
     from fractalcontact.surfaces._from_points import from_points, grid_points  # loads numba
 
     units, spacing, stated = request.units, request.spacing, points.attrs["stated_unit"]
+    _warn_of_missing(points["position"].values[..., -1], request.path.name, "points")
     require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
     options = {"units": units or stated or "m", "plane": request.plane}
@@ -294,7 +299,7 @@ def _heights_content(values: Array, request: Request) -> xr.DataArray:
     """Return an array of heights without coordinates as a surface."""
     spacing = request.spacing
     with Problems("", UnreadableFile) as problems:
-        expected = f"the spacing in metres, which {request.path.name!r} does not state"
+        expected = f"{SPACING_NEEDED}, which {request.path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
         if values.dtype.kind == "f":
             problems.not_infinite("path", values)
@@ -342,6 +347,23 @@ def _height_variables(content: Any) -> dict[str, xr.DataArray]:
         for name, array in group.data_vars.items()
         if "x" in array.dims and array.dtype.kind in "fiu"
     }
+
+
+def _warn_of_missing(heights: Array, name: str, what: str, unit: str = "m") -> None:
+    """Warn where the lowest or the highest height is that of several cells or points, far from all others.
+
+    A number for "no data" is. Heights that an instrument cuts off lie at the end of the others, not 10 times
+    their range away; a step between two flats has no range beside it.
+    """
+    heights = heights[np.isfinite(heights)]
+    for extreme in (heights.min(), heights.max()) if heights.size else ():
+        count = int(np.count_nonzero(heights == extreme))
+        others = heights[heights != extreme] if 1 < count < heights.size else heights[:1]
+        width = float(np.ptp(others))
+        if width > 0 and float(np.abs(others - extreme).min()) > 10.0 * width:
+            shown = f"{extreme / in_metres(1.0, unit):.7g}"
+            message = f"{name}: {count} {what} hold {shown}, far from all others: missing heights?"
+            warn(f"{message} If so, write nan in their place", ScaleWarning)
 
 
 def _warn_of_scale(surface: xr.DataArray, name: str) -> None:

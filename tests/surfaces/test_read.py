@@ -6,6 +6,7 @@ import json
 import re
 import struct
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -272,6 +273,36 @@ def test_implausible_scale_warns(tmp_path):
         fc.surfaces.read(tmp_path / "a.npy", spacing=1e-6)
     np.save(tmp_path / "flat.npy", np.zeros((3, 4)))
     fc.surfaces.read(tmp_path / "flat.npy", spacing=1e-6)
+
+
+@pytest.mark.parametrize("missing", [-9999, 9999, 0])
+@pytest.mark.parametrize("form", ["csv", "xyz"])
+def test_number_for_missing_heights_is_named(tmp_path, missing, form):
+    """Any number that several cells hold far from all other heights; in the unit of the file."""
+    heights = 50.0 + 0.1 * np.random.default_rng(1).random((20, 30))
+    heights[3:7, 5:9] = missing
+    y, x = np.indices(heights.shape)
+    table = heights if form == "csv" else np.stack([x.ravel(), y.ravel(), heights.ravel()], axis=1)
+    np.savetxt(tmp_path / f"scan.{form}", table, delimiter=",")
+    spacing = {"spacing": 1e-3} if form == "csv" else {}
+    with warnings.catch_warnings(record=True) as caught:  # the range of the heights warns as well
+        warnings.simplefilter("always")
+        fc.surfaces.read(tmp_path / f"scan.{form}", units="mm", **spacing)
+    words = " ".join(str(each.message) for each in caught)
+    assert re.search(f"16 (cells|points) hold {missing}, far from .*missing heights.*write nan", words)
+
+
+def test_clipped_heights_steps_and_spikes_are_not_missing(tmp_path):
+    rough = np.random.default_rng(1).normal(size=(40, 40))
+    spiked = rough.copy()
+    spiked[5, 5] = -999.0
+    steps = np.where(np.arange(40) < 20, 0.0, 100.0) * np.ones((40, 1))
+    for name, heights in (("clipped", np.clip(rough, -1, 1)), ("spiked", spiked), ("steps", steps)):
+        np.save(tmp_path / f"{name}.npy", heights)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            fc.surfaces.read(tmp_path / f"{name}.npy", spacing=1e-3, units="um")
+        assert "missing heights" not in str([str(each.message) for each in caught])
 
 
 INSTRUMENTS = {
@@ -564,5 +595,6 @@ def test_table_without_spacing_says_so_with_and_without_the_extra(tmp_path, monk
     with pytest.raises(UnreadableFile) as raised:
         fc.surfaces.read(tmp_path / "heights.csv")
     assert list(raised.value.problems) == [
-        "spacing: expected the spacing in metres, for 'heights.csv' as a table of heights, got None"
+        "spacing: expected the spacing in metres (on the command line `--spacing 0.3mm`), for 'heights.csv' "
+        "as a table of heights, got None"
     ]
