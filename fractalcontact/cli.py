@@ -52,6 +52,7 @@ HELP = {  # of options, where it is long
     "young": "Young's modulus of both bodies, Pa, or with its unit: 30e9, 30GPa",
     "units": "unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of "
     "the file, else m)",
+    "spacing": "distance between the points, or of the cells, m, or with its unit: 3e-4, 0.3mm",
     "benchmarks": "surfaces, dimensions, contact, domains, joints: error against run time of their methods "
     "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
     "of roughness",
@@ -66,7 +67,10 @@ QUESTIONS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    options = _parsers()[0].parse_args(arguments)
+    parser, commands = _parsers()
+    options, unknown = parser.parse_known_args(arguments)
+    if unknown:  # with the usage of the command, which has the options
+        commands[options.command].error(f"unrecognized arguments: {' '.join(unknown)}")
     if arguments is None:
         collect_rarely()
         if getattr(options, "scheduler", None) is None:
@@ -107,7 +111,7 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
         description="Rough surfaces in contact: roughness, contact, closure, dilatancy and shear strength.",
     )
     parser.add_argument("--version", action="version", version=f"fractalcontact {fc.__version__}")
-    commands = parser.add_subparsers(required=True, metavar="command")
+    commands = parser.add_subparsers(required=True, dest="command", metavar="command")
 
     run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
     add = run.add_argument
@@ -182,6 +186,18 @@ def _pascal(text: str) -> float:
     return value
 
 
+def _metre(text: str) -> float:
+    """Return a length in metres, given as a number or with its unit: `0.3 mm`."""
+    from fractalcontact.base.units import metres
+
+    value = metres(text)
+    if value is None:
+        raise argparse.ArgumentTypeError(
+            f"expected a length in metres, or with its unit (0.3 mm), got {text!r}"
+        )
+    return value
+
+
 def _add_question(commands: Any, question: str, line: str) -> None:
     """Add a command that answers one question to a scan."""
     command = commands.add_parser(question, help=line)
@@ -200,7 +216,7 @@ def _add_question(commands: Any, question: str, line: str) -> None:
         add("--poisson", type=float, default=0.2, help="Poisson's ratio (default 0.2)")
     add("--despike", action="store_true", help="remove spikes of the scan")
     add("--units", help=HELP["units"])
-    add("--spacing", type=float, help="distance between the points, or of the cells, in m")
+    add("--spacing", type=_metre, help=HELP["spacing"])
     add("-o", "--out", help=HELP["question folder"])
     add("--scene", action="store_true", help="print the scene and run nothing")
     _add_run_options(command)
@@ -335,6 +351,7 @@ def _init(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     from fractalcontact.base.tables import screen_width
+    from fractalcontact.base.units import number
     from fractalcontact.base.validation import Problems
 
     if options.plan:
@@ -352,7 +369,7 @@ def _run(options: argparse.Namespace) -> int:
         size = (out / files.RESULT).stat().st_size
         drawn = f" and {figures} figure{'s' * (figures > 1)}" if figures else ""
         memory = f"; peak memory {peak / 1e6:.0f} MB" if (peak := peak_memory()) else ""
-        written = f"written to {out}: {files.RESULT} ({size / 1e6:.2g} MB), report.html{drawn}{memory}"
+        written = f"written to {out}: {files.RESULT} ({number(size / 1e6, 2)} MB), report.html{drawn}{memory}"
         print("\n" + textwrap.fill(written, screen_width(), subsequent_indent="  ", break_long_words=False))
         print(f"next: open {out / 'report.html'} in a browser")
     has_failed = "overview" in tree.children and (tree["overview/status"] != "done").any()

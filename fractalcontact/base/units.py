@@ -29,6 +29,7 @@ PREFIXES = {
 }  # fmt: skip
 PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
 PRESSURE = re.compile(r"^\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*$")
+LENGTH = re.compile(r"^\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -147,6 +148,24 @@ def pascals(text: str) -> float | None:
         return float(parts[1]) * 10.0 ** powers[parts[2]] if parts else None
     except ValueError:
         return None
+
+
+def metres(text: str) -> float | None:
+    """Return a length in metres that is written as a number or with its unit; None for other words.
+
+    Examples
+    --------
+    >>> metres("0.3 mm"), metres("2e-6"), metres("1.5e3nm"), metres("30 GPa")
+    (0.0003, 2e-06, 1.5e-06, None)
+    """
+    parts = LENGTH.match(text)
+    try:
+        value = float(parts[1]) if parts else None
+    except ValueError:
+        return None
+    if value is None or (parts[2] or "m") not in UNITS:
+        return None
+    return float(in_metres(value, parts[2] or "m"))
 
 
 def number(value: float, digits: int = 3) -> str:

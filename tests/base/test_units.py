@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from fractalcontact.base.units import (
     fixed,
+    metres,
     number,
     quantity_text,
 )
@@ -49,3 +50,14 @@ def test_zero_has_no_sign():
     assert fixed(0.5, 2, sign=True) == "+0.50"
     assert fixed(float("nan"), 2) == "nan"
     assert number(-0.0) == "0"
+
+
+@pytest.mark.parametrize(
+    ("text", "metre"),
+    [
+        ("0.3mm", 3e-4), ("0.3 mm", 3e-4), ("3e-4", 3e-4), ("3e-1mm", 3e-4), ("300 µm", 3e-4),
+        ("2 in", 0.0508), ("0.3 GPa", None), ("mm", None), ("1.2.3 mm", None), ("", None),
+    ],
+)  # fmt: skip
+def test_lengths_with_units(text, metre):
+    assert metres(text) == (None if metre is None else pytest.approx(metre, rel=1e-12))

@@ -350,3 +350,23 @@ def test_key_in_the_wrong_table_is_reported_first(scans):
         "'wall_strength' belongs to [joint.shear_curve] or [joint.strength_envelope]"
         in caught.value.problems[0]
     )
+
+
+def test_spacing_may_have_its_unit(scans, capsys):
+    np.savetxt("table.csv", fc.open("lower.nc").values, delimiter=",")
+    assert main(["roughness", "table.csv", "--spacing", "0.2mm", "--scene"]) == 0
+    assert tomllib.loads(capsys.readouterr().out)["surface"]["spacing"] == pytest.approx(2e-4, rel=1e-12)
+    assert main(["roughness", "table.csv", "--scene"]) == 2
+    assert "--spacing 0.3mm" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["roughness", "table.csv", "--spacing", "2 Pa"])
+    assert "expected a length in metres, or with its unit (0.3 mm), got '2 Pa'" in capsys.readouterr().err
+
+
+def test_option_of_another_command_shows_the_usage_of_the_command(scans, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["joint", "lower.nc", "upper.nc", "--young", "30GPa", "--load", "2MPa"])
+    assert left.value.code == 2
+    error = capsys.readouterr().err
+    assert error.startswith("usage: fractalcontact joint ")
+    assert "unrecognized arguments: --load 2MPa" in error
