@@ -174,7 +174,8 @@ def axis_faults(array: xr.DataArray | xr.Dataset, dim: str, name: str) -> Iterat
         distance = np.abs(centres - (centres[0] + spacing * np.arange(n))).max()
         # far from the origin places are rounded: as given, as computed, and at both ends, for the spacing
         if not distance <= UNIFORM * spacing + 4.0 * np.spacing(np.abs(centres).max()):
-            yield name, "uniform spacing", f"centres up to {distance / spacing:.3g} spacings off their place"
+            expected = "uniform spacing (see fractalcontact.surfaces.from_points)"
+            yield name, expected, f"centres up to {distance / spacing:.3g} spacings off their place"
 
 
 def _units_faults(attributes: Mapping[Any, Any], name: str) -> Iterator[Fault]:
@@ -216,6 +217,8 @@ def surface_faults(
     """
     if not isinstance(surface, xr.DataArray):
         expected = "a DataArray of heights (see fractalcontact.surfaces.from_array)"
+        # any function with an argument of this name takes a plain array beside `spacing`
+        expected += ", or give spacing= (m)" if argument == "surface" else ""
         yield argument, expected, type(surface).__name__
         return
     dims = core_dims(surface) if profile else ("y", "x")

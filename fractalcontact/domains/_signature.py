@@ -384,10 +384,19 @@ def _flags(
                 for g, s in zip(gap, start, strict=True)
             ],
         ),
-        (islands < FEWEST_ISLANDS, [f"{number} islands, fewer than {FEWEST_ISLANDS}" for number in islands]),
+        (
+            islands < FEWEST_ISLANDS,
+            [
+                f"{number} island{'' if number == 1 else 's'}, fewer than {FEWEST_ISLANDS}"
+                for number in islands
+            ],
+        ),
         (
             median < fewest_cells,
-            [f"the median island has {cells:g} cells, fewer than {fewest_cells}" for cells in median],
+            [
+                f"the median island has {cells:g} cell{'' if cells == 1 else 's'}, fewer than {fewest_cells}"
+                for cells in median
+            ],
         ),
     ]
     flags = [next((flag for flag, (fails, _) in enumerate(tests, 1) if fails[k]), 0) for k in range(count)]

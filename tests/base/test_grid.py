@@ -50,7 +50,7 @@ def test_large_offset_of_the_coordinates_is_valid():
 @pytest.mark.parametrize(
     ("spoil", "word"),
     [
-        (lambda a: a.isel(x=[0, 1, 3]), "uniform"),
+        (lambda a: a.isel(x=[0, 1, 3]), "uniform spacing .see fractalcontact.surfaces.from_points"),
         (lambda a: a.isel(x=slice(None, None, -1)), "ascending"),
         (lambda a: a.drop_vars("y"), "surface.y"),
         (lambda a: a.transpose("x", "y"), "surface.dims"),
@@ -59,7 +59,7 @@ def test_large_offset_of_the_coordinates_is_valid():
         (lambda a: a.where(a.x > 2e-6), "NaN"),
         (lambda a: a.isel(x=slice(0, 2)), "at least 3"),
         (lambda a: a.expand_dims(member=2), "surface.dims"),
-        (lambda a: a.values, "from_array"),
+        (lambda a: a.values, "from_array., or give spacing= .m."),
         (lambda a: a.astype(complex), "real numbers"),
     ],
 )

@@ -82,6 +82,12 @@ def test_unknown_argument_names_the_function_and_the_nearest_argument():
         fc.contact.press(None, contact_modulus=1e9, closur=1e-6)
     with pytest.raises(TypeError, match="'modulus' is no argument .did you mean 'contact_modulus'"):
         fc.contact.press(None, modulus=1e9)
+    with pytest.raises(
+        TypeError, match="'E' is no argument .its arguments are surface, contact_modulus, .*spacing"
+    ):
+        fc.contact.press(None, E=1e9)
+    with pytest.raises(TypeError, match="'spacin' is no argument .did you mean 'spacing'"):
+        fc.contact.press(None, contact_modulus=1e9, spacin=1e-6)
     with pytest.raises(TypeError, match=r"fractalcontact\.contact\.press: missing .*contact_modulus"):
         fc.contact.press(None)
 

@@ -185,6 +185,7 @@ def test_flags_say_why_there_is_no_dimension():
         "unresolved": "fewer than 10",
     }.items():
         assert words in reasons[name]
+    assert "the median island has 1 cell, fewer" in reasons["unresolved"]
     for name in ("domain_dimension", "domain_dimension_low", "spots_dimension", "local_dimension_min"):
         assert np.isfinite(result[name]).values.tolist() == [True, *[False] * 5]
     assert np.isnan(result.clustering[[1, 2, 5]]).all()
