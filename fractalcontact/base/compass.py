@@ -15,6 +15,7 @@ from fractalcontact.base.validation import GIVEN, Problems
 AZIMUTHS = {name: 45.0 * i for i, name in enumerate(("E", "NE", "N", "NW", "W", "SW", "S", "SE"))}
 COMPASS = ("E", "N", "W", "S")
 WORDS = {"east": "E", "north": "N", "west": "W", "south": "S"}
+WORDS |= {word.title(): name for word, name in WORDS.items()}
 EXPECTED = f"one of {', '.join(AZIMUTHS)}, or an azimuth in degrees"
 LARGEST_AZIMUTH = 1e9  # degree; beyond it a double has no digits left below 360
 # along an axis the other component is exactly zero, so that shifts by whole cells stay whole

@@ -387,3 +387,12 @@ dimensions = ["psd"]
     path.write_text(text.replace("30 GPa", "30 GN").replace("west", "left"))
     with pytest.raises(InvalidInput, match=r"(?s)young.*30 GN.*left"):
         fc.scenes.load(path)
+
+
+@pytest.mark.parametrize("word", ["W", "west", "West"])
+def test_directions_are_the_words_that_python_takes(tmp_path, word):
+    (tmp_path / "study.toml").write_text(SOUND.replace('"W"', f'"{word}"'), encoding="utf-8")
+    assert fc.scenes.load(tmp_path / "study.toml").tables["joint"]["direction"] == "W"
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=4e-6, rng=1)
+    result = fc.joints.roughness_coefficient(face, direction=word, lag=5e-4)
+    assert result["direction"].values.tolist() == ["W"]
