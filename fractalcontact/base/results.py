@@ -127,10 +127,10 @@ def public_result(
     declare(quantities)
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
-        signature = inspect.signature(function)
+        signature: inspect.Signature = inspect.signature(function)
         name = public_name(function)
         hands_on = hasattr(function, "takes_checked")
-        takes_spacing = SURFACE in signature.parameters and SPACING not in signature.parameters
+        takes_spacing: bool = SURFACE in signature.parameters and SPACING not in signature.parameters
 
         def checked(arguments: Any, options: dict[str, Any]) -> tuple[inspect.BoundArguments, str, Any]:
             spacing = options.pop(SPACING, None) if takes_spacing else None

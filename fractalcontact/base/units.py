@@ -159,13 +159,13 @@ def metres(text: str) -> float | None:
     (0.0003, 2e-06, 1.5e-06, None)
     """
     parts = LENGTH.match(text)
+    unit = (parts[2] or "m") if parts else ""
+    if not parts or unit not in UNITS:
+        return None
     try:
-        value = float(parts[1]) if parts else None
+        return float(in_metres(float(parts[1]), unit))
     except ValueError:
         return None
-    if value is None or (parts[2] or "m") not in UNITS:
-        return None
-    return float(in_metres(value, parts[2] or "m"))
 
 
 def number(value: float, digits: int = 3) -> str:

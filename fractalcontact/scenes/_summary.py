@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.file_contents import stage_rows
-from fractalcontact.base.grid import EXCESS_PER_EDGE
+from fractalcontact.base.grid import EXCESS_PER_EDGE, read_grid
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of, member_count, of_member, scene_of
 from fractalcontact.base.tables import note, table
@@ -374,17 +374,28 @@ def _cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
     if "state" in pressed:
         planes = pressed["state"].transpose(*fraction.dims, "y", "x")
         masks = np.asarray(planes.values).reshape(-1, *planes.shape[-2:]) > 0
-        medians = np.array([_median_cells(mask) for mask in masks])
+        wraps = read_grid(planes).periodic if {"y", "x"} <= planes.coords.keys() else (False, False)
+        medians = np.array([_median_cells(mask, wraps) for mask in masks])
         return fraction.copy(data=medians.reshape(fraction.shape))
     edges = (fraction - pressed["corrected_contact_fraction"]) / (EXCESS_PER_EDGE * fraction)
     return (4.0 / edges.where(edges > 0)) ** 2
 
 
-def _median_cells(mask: Array) -> float:
+def _median_cells(mask: Array, wraps: Sequence[bool]) -> float:
+    """Return the median number of cells of the islands, which go on across periodic edges."""
     from scipy import ndimage  # only for this caveat: other summaries need no scipy
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
 
     labels, count = ndimage.label(mask)
-    return float(np.median(np.bincount(labels.ravel())[1:])) if count else float("nan")
+    if not count:
+        return float("nan")
+    pairs = [(labels.take(0, axis), labels.take(-1, axis)) for axis in (0, 1) if wraps[axis]]
+    first, last = np.concatenate([np.zeros((2, 0), int), *map(np.array, pairs)], axis=1)
+    meet = (first > 0) & (last > 0)
+    links = coo_array((np.ones(meet.sum()), (first[meet] - 1, last[meet] - 1)), shape=(count, count))
+    _, island = connected_components(links, directed=False)
+    return float(np.median(np.bincount(island, np.bincount(labels.ravel())[1:])))
 
 
 @_of_contacts
