@@ -57,6 +57,17 @@ def test_resolved_spots_have_no_caveat(smooth):
     assert "not resolved" not in text(study(smooth))
 
 
+@pytest.mark.parametrize("shift", [0, 16])
+def test_a_contact_across_a_periodic_edge_is_one_island(shift):
+    """One bump has 73 cells in contact: cut by the edges its four parts have 13 to 24 each."""
+    y, x = np.mgrid[:32, :32] - 16.0
+    bump = np.roll(-1e-8 * np.minimum(x**2 + y**2, 200.0), (shift, shift), (0, 1))
+    surface = fc.surfaces.from_array(bump, 1e-5, periodic=True)
+    pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=3e5)
+    assert float(fc.domains.islands(pressed.state).cells.max()) > 30
+    assert "not resolved" not in text(study(pressed))
+
+
 def test_resolution_is_stated_without_the_maps(rough, smooth):
     assert "not resolved at every load" in text(study(rough.drop_vars("state")))
     assert "from their perimeter" in text(study(rough.drop_vars("state")))
