@@ -101,7 +101,8 @@ def _grey_values(path: Path) -> Array:
     with reading("fractalcontact.domains.read_mask", path):
         content = path.read_bytes()
     try:
-        image = np.asarray(imread(io.BytesIO(content)))
+        image = _from_inks(content)
+        image = np.asarray(imread(io.BytesIO(content))) if image is None else image
     except Exception as error:  # each of the image libraries raises exceptions of its own
         raise UnreadableFile(path.name, [f"path: expected an image, got {type(error).__name__}"]) from error
     if image.ndim == 3 and image.shape[-1] == 2:  # grey value and opacity
@@ -111,6 +112,17 @@ def _grey_values(path: Path) -> Array:
     if image.ndim != 2:
         raise UnreadableFile(path.name, [f"path: expected one image, got an array of shape {image.shape}"])
     return image.astype(np.float64)
+
+
+def _from_inks(content: bytes) -> Array | None:
+    """Return the colours of an image of four inks (CMYK), whose numbers are dark where they are large."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(content)) as image:
+            return np.asarray(image.convert("RGB")) if image.mode == "CMYK" else None
+    except UnidentifiedImageError:  # of a format that another library reads
+        return None
 
 
 def _threshold(grey: Array, levels: Array, name: str) -> float:

@@ -108,7 +108,8 @@ def _source(tree: xr.DataTree) -> str:
         return version
     grid = read_grid(heights["height"])
     edges = " x ".join(quantity_text(side, "m") for side in grid.extent)
-    return f"face of {edges}, {quantity_text(grid.spacing[-1], 'm')} apart; {version}"
+    apart = " x ".join(dict.fromkeys(quantity_text(step, "m") for step in grid.spacing))
+    return f"face of {edges}, {apart} apart; {version}"
 
 
 def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
@@ -120,11 +121,13 @@ def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
     crack = stated.get("crack")
     if isinstance(crack, dict):
         stated = crack | stated
-        block, cells = crack["block"][-1], crack["block_cells"][-1]
-        edges = " x ".join(quantity_text(n * block / cells, "m") for n in crack["lower"]["dims"].values())
+        spacing = [side / n for side, n in zip(crack["block"], crack["block_cells"], strict=True)]  # y, x
+        counts = [crack["lower"]["dims"][dim] for dim in ("y", "x")]
+        edges = " x ".join(quantity_text(n * step, "m") for n, step in zip(counts, spacing, strict=True))
+        apart = " x ".join(dict.fromkeys(quantity_text(step, "m") for step in spacing))
         faces = "mated copy above" if crack["upper"] == "mated" else "both faces scanned"
         sides = " x ".join(quantity_text(side, "m") for side in crack["block"])
-        yield f"face of {edges}, heights {quantity_text(block / cells, 'm')} apart, {faces}; block of {sides}"
+        yield f"face of {edges}, heights {apart} apart, {faces}; block of {sides}"
     texts = []
     for key, (symbol, units) in INPUTS.items():
         values = np.ravel(stated[key] if stated.get(key) is not None else [])

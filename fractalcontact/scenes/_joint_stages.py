@@ -54,6 +54,12 @@ def _extreme(choose: Any, fewest: int) -> Any:
     return describe
 
 
+def _only_azimuth(data: xr.Dataset) -> str | None:
+    """Return the roughness of the one azimuth that was measured: it is the largest of none."""
+    is_one = data["roughness_metric"].sizes.get("azimuth", 1) == 1
+    return _extreme(np.nanargmax, 1)(data) if is_one else None
+
+
 def _azimuths(*_: object) -> Iterator[str]:
     yield "Azimuths are from E (+x) anticlockwise; a compass bearing is 90° minus the azimuth."
 
@@ -167,6 +173,16 @@ def _with_ends(state: xr.Dataset, name: str, scale: Scale) -> str:
     ends = [float(scale(state[word])) for word in (name, f"{name}_low", f"{name}_high")]
     value, low, high = (number(end) if np.isfinite(end) else "no bound" for end in ends)
     return f"{value} ({low} to {high}) {scale.unit}"
+
+
+def _outside_criterion(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield under which pressures a shear curve is outside the range of its criterion."""
+    is_outside = ~data["in_range"].astype(bool)
+    dims = [dim for dim in is_outside.dims if dim != "nominal_pressure"]
+    outside = np.atleast_1d(data["nominal_pressure"].where(is_outside.any(dims)).values)
+    pressures = [quantity_text(value, "Pa") for value in outside[np.isfinite(outside)]]
+    if pressures:
+        yield f"shear curve: outside the range of its criterion at {', '.join(pressures)}"
 
 
 def _rigid_faces(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
@@ -412,7 +428,8 @@ STAGES = (
         "directional_roughness",
         "directional roughness (Grasselli), theta_max / (C + 1)",
         (),
-        Column("largest roughness metric", _extreme(np.nanargmax, 1)),
+        Column("roughness metric", _only_azimuth),
+        Column("largest roughness metric", _extreme(np.nanargmax, 2)),
         Column("smallest roughness metric", _extreme(np.nanargmin, 2)),
         remarks=_azimuths,
     ),
@@ -434,6 +451,7 @@ STAGES = (
         ("nominal_pressure",),
         Column("peak strength (shear curve)", "peak_shear_strength"),
         Column("at displacement", "peak_displacement"),
+        remarks=_outside_criterion,
         one_direction=True,
     ),
     _of_surface(
@@ -481,7 +499,7 @@ STAGES = (
         Column("effective stress", "effective_stress"),
         Column("normal stress", _normal_stress),
         Column("uplift", at_value("uplift_force", "diagram", "joint")),
-        Column("of the drained diagram", at_value("uplift_force", "diagram", "drained"), screen=False),
+        Column("of the bilinear diagram", at_value("uplift_force", "diagram", "bilinear"), screen=False),
         Column("of the linear diagram", at_value("uplift_force", "diagram", "linear"), screen=False),
         Column("arm, joint", at_value("uplift_arm", "diagram", "joint")),
         remarks=_uplift_remarks,

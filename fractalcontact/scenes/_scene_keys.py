@@ -171,7 +171,7 @@ SHARED = {
     "block": _numbers(above=0.0).about("Edges of the upper block, m."),
     **dict.fromkeys(("spacing", "structure_size"), _numbers(above=0.0)),
     **{key: _numbers(unit=key in PRESSURES, at_least=0.0) for key in ("shear", *LOADS)},
-    "direction": Kind(compass.check_directions, _one_or_several(_DIRECTION)),
+    "direction": Kind(compass.check_directions, {"anyOf": [*_one_or_several(_DIRECTION)["anyOf"], *RANGES]}),
 }
 LEVEL = _integer(at_least=0).about("Remove the least-squares polynomial of this degree.")
 PREPARATION = {

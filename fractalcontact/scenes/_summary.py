@@ -230,10 +230,15 @@ def written_rows(each: ResultTable) -> list[tuple[str, ...]]:
 # by group, columns of the table that its stage declares
 SHOWN = {
     "joints/roughness_coefficient": ("JRC", "scatter of the profiles", "read every", "regression over"),
-    "joints/directional_roughness": ("largest roughness metric", "smallest roughness metric"),
+    "joints/directional_roughness": (
+        "roughness metric",
+        "largest roughness metric",
+        "smallest roughness metric",
+    ),
     "joints/strength_envelope": (),  # its remarks alone: the page has its curves
     "joints/direct_shear": ("peak strength", "friction angle", "residual strength"),
     "joints/uplift": ("uplift", "of the linear diagram"),
+    "joints/shear_curve": (),  # its remark: the page has its curves
     "joints/closure_laws": ("preferred law", "seating pressure"),
 }
 
@@ -416,7 +421,8 @@ def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset, least: int = 30)
     ends = dict.fromkeys(number(float(end[greatest]), 2) for end in (low, high))
     cell = "cell" if list(ends) == ["1"] else "cells"
     of_loads = f"{int(unresolved.sum())} of {int(touching.sum())} loads"
-    source = "" if "state" in pressed else ", from their perimeter"
+    sizes = f"{' to '.join(ends)} {cell}"
+    sizes = f"median island {sizes}" if "state" in pressed else f"{sizes} an island, from their perimeter"
     where = "every load" if unresolved.sum() == touching.sum() else of_loads
     ratio = pressed["contact_fraction"] / pressed["corrected_contact_fraction"].where(cells < least) - 1.0
     excess = float(ratio.where(np.isfinite(ratio)).max())
@@ -426,8 +432,8 @@ def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset, least: int = 30)
         else ""
     )
     yield (
-        f"{path}: contacts are not resolved at {where} (median island {' to '.join(ends)} {cell}, {least} "
-        f"needed{source}): {counted}the shapes and the dimension of islands are those of the grid."
+        f"{path}: contacts are not resolved at {where} ({sizes}, {least} needed): {counted}the "
+        f"shapes and the dimension of islands are those of the grid."
     )
 
 

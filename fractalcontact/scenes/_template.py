@@ -136,7 +136,8 @@ def template(
             _check_files("upper", upper, problems)
         if surface is not None:
             problems.surface("surface", surface, finite=False, smallest=1, leading=True)
-    facts = _facts(_first_surface(scan, options) if surface is None else surface)
+    surface = _first_surface(scan, options) if surface is None else surface
+    facts = _facts(surface)
     if despike:
         options["despike"] = True
     if is_pressed and (despike or facts["missing"]):
@@ -155,7 +156,7 @@ def template(
         material |= {"basic_friction_angle": friction_angle, "yield_pressure": wall_strength}
         values = _travel(facts)
     else:
-        values = _loads(facts, young, poisson) if is_pressed else _roughness(facts)
+        values = _loads(_slope(surface, options), young, poisson) if is_pressed else _roughness(facts)
     return packaged_template("question.toml.jinja", keep_trailing_newline=True).render(
         question=question,
         title=f"{question.capitalize()} of {' and '.join(dict.fromkeys(names))}",
@@ -219,19 +220,16 @@ def _first_surface(scan: Files, options: Mapping[str, Any]) -> xr.DataArray:
 
 
 def _facts(surface: xr.DataArray) -> dict[str, Any]:
-    """Return spacing, extent, rms slope of a surface, and whether it has gaps."""
-    from fractalcontact import surfaces
-
+    """Return spacing and extent of a surface, and whether it has gaps."""
     if surface.ndim > 2:
         raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])
     if "y" not in surface.dims:
         message = "scan: expected a surface, got a profile: see fractalcontact.dimensions.estimate"
         raise InvalidInput(WHERE, [message])
-    grid, statistics = read_grid(surface), surfaces.describe(surface)
+    grid = read_grid(surface)
     return {
         "spacing": max(grid.spacing),
         "extent": min(grid.extent),
-        "slope": float(statistics["rms_slope"]),
         "missing": bool(surface.isnull().any()),
         "periodic": any(grid.periodic),
         "of_points": "gridding" in provenance_of(surface),
@@ -261,11 +259,22 @@ def _roughness(facts: Mapping[str, Any], lag: float = 0.508e-3) -> dict[str, Any
     return {"has_jrc": is_long and spacing <= lag}
 
 
-def _loads(facts: Mapping[str, Any], young: Any, poisson: float) -> dict[str, Any]:
+def _slope(surface: xr.DataArray, options: Mapping[str, Any]) -> float:
+    """Return the rms slope of a surface as the scene presses it: without spikes and tilt that it removes."""
+    from fractalcontact import surfaces
+
+    if options.get("despike"):
+        surface = surfaces.despike(surface)
+    if options.get("level"):
+        surface = surfaces.level(surface, options["level"])
+    return float(surfaces.describe(surface)["rms_slope"])
+
+
+def _loads(slope: float, young: Any, poisson: float) -> dict[str, Any]:
     """Return the ends of the path of the load on a flat: true contact of a thousandth and of a fifth."""
     # a fraction of true contact needs about half of it times modulus and rms slope (Bush; Persson)
     modulus = 0.5 * float(young) / (1.0 - poisson**2)
-    unit = 0.5 * modulus * max(facts["slope"], 1e-12)  # of a flat surface: above 0
+    unit = 0.5 * modulus * max(slope, 1e-12)  # of a flat surface: above 0
     return {"first": _rounded(1e-3 * unit), "last": _rounded(0.2 * unit)}
 
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import skimage as ski
+from PIL import Image
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput, UnreadableFile
@@ -68,3 +69,14 @@ def test_file_that_is_no_image(tmp_path):
     (tmp_path / "text.png").write_text("no image")
     with pytest.raises(UnreadableFile, match="expected an image"):
         fc.domains.read_mask(tmp_path / "text.png", 1e-4)
+
+
+@pytest.mark.parametrize("suffix", [".jpg", ".tif"])
+def test_inks_are_dark_where_they_are_large(tmp_path, suffix):
+    """A picture made for print (CMYK) was taken for colours with opacity: its set was the complement."""
+    mask = np.zeros((40, 60), dtype=bool)
+    mask[8:24, 16:40] = True
+    picture = Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).convert("RGB").convert("CMYK")
+    picture.save(tmp_path / f"print{suffix}")
+    read = fc.domains.read_mask(tmp_path / f"print{suffix}", 1e-4)
+    np.testing.assert_array_equal(read.values[::-1], mask)

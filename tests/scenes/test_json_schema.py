@@ -160,3 +160,26 @@ def test_every_key_has_a_meaning():
 
     without = [place for place, value in keys(SCHEMA, "") if "description" not in value]
     assert not without
+
+
+def test_a_range_of_directions_fits(tmp_path):
+    text = """
+[surface]
+generate = "fbm"
+shape = [32, 32]
+spacing = 1e-4
+hurst = 0.8
+rms_increment = 5e-6
+rng = 2
+[joint]
+block = 1.6e-3
+[joint.rigid_dilatancy]
+shear = [0.0, 2e-4]
+direction = { start = 0.0, stop = 90.0, step = 45.0 }
+[want]
+joints = ["rigid_dilatancy"]
+"""
+    (tmp_path / "range.toml").write_text(text)
+    jsonschema.validate(tomllib.loads(text), SCHEMA)
+    tree = fc.scenes.run(tmp_path / "range.toml", progress=False)
+    assert tree["joints/rigid_dilatancy/azimuth"].values.tolist() == [0.0, 45.0, 90.0]

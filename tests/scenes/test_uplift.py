@@ -148,3 +148,9 @@ def test_the_profile_is_among_the_tables(scene):
     profile = tables["joints_uplift_by_shear_step_diagram_x"]
     assert len(profile) == 2 * 3 * 3 * 24
     assert "uplift_profile (Pa)" in profile
+
+
+def test_the_summary_has_the_uplift_of_all_diagrams(scene):
+    text = fc.scenes.summary(fc.scenes.run(scene(), progress=False), verbose=True)
+    for diagram in ("bilinear", "linear"):
+        assert f"of the {diagram} diagram" in text
