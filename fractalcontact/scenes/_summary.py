@@ -208,7 +208,7 @@ SHOWN = {
     "joints/roughness_coefficient": ("JRC", "scatter of the profiles", "read every", "regression over"),
     "joints/directional_roughness": ("largest roughness metric", "smallest roughness metric"),
     "joints/strength_envelope": (),  # its remarks alone: the page has its curves
-    "joints/direct_shear": ("peak strength", "friction angle", "residual strength"),
+    "joints/direct_shear": ("peak strength", "friction angle", "strength at the end", "end at shear"),
     "joints/uplift": ("uplift", "of the linear diagram"),
     "joints/closure_laws": ("preferred law", "seating pressure"),
 }
