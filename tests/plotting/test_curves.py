@@ -94,7 +94,7 @@ def test_scans_are_sorted_with_intervals_and_outliers():
     assert np.allclose(numbers["interval"][:4], [0.5, 2, 1, 4])
     assert [text.get_text() for text in ax.texts] == ["e.sur"]
     assert [label.get_text() for label in ax.get_yticklabels()] == [f"{letter}.sur" for letter in "bafdge"]
-    assert [text.get_text() for text in ax.artists[0].get_texts()] == ["interval", "median", "outlier"]
+    assert [text.get_text() for text in ax.artists[0].get_texts()] == ["interval", "outlier", "median"]
 
 
 def test_a_scan_has_one_row_in_all_panels():
