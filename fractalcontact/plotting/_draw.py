@@ -97,8 +97,8 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
         path of load or shear; numbers alone have none. The kinds, with their options and the functions whose
         results have them as the standard:
 
-        - closure (`laws`, `shear`, `marked`, `key`, `log`): normal force against total (thin) and interface
-          closure; with `laws` of `joints.closure_laws` these through its steps. `contact.press`,
+        - closure (`laws`, `shear`, `marked`, `key`, `log`, `against`): load against total (thin) and
+          interface closure; with `laws` of `joints.closure_laws` these through its steps. `contact.press`,
           `joints.closure`.
         - contact_area (`against`, `theory`, `log`): share in contact, corrected for the perimeter and as
           counted (dashed), with the curves of `contact.theories`.
@@ -120,11 +120,12 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
         Figures with a function of their own, such as `dilatancy`, are kinds too.
     **options
         `units` by name of a variable, `ax` or `axes` to draw into, and those of the kind. `shear` (m) and
-        `normal_force` (N) choose the nearest state; `against` is normal_force, nominal_pressure or closure;
-        `marked` are steps to mark A, B, C ... at that shear; `key` (bool) is the legend of the shears; `log`
-        (bool) shows every decade, of contact_area with a line proportional to the load; `panels` is the
-        largest number of maps; `zoom` is 0 for no window, and None for one where cells are hard to see;
-        `theory` is from `contact.theories`, `beside` another shear curve or test.
+        `normal_force` (N) choose the nearest state; `against` is normal_force, nominal_pressure or closure,
+        by default the force or pressure that was prescribed; `marked` are steps to mark A, B, C ... at that
+        shear; `key` (bool) is the legend of the shears; `log` (bool) shows every decade, of contact_area with
+        a line proportional to the load; `panels` is the largest number of maps; `zoom` is 0 for no window,
+        and None for one where cells are hard to see; `theory` is from `contact.theories`, `beside` another
+        shear curve or test.
 
     Returns
     -------
@@ -143,8 +144,8 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
     >>> print(fc.plotting.plot(pressed).get_ylabel())
-    normal force $F$ (N)
-    >>> ax = fc.plotting.plot(pressed, "contact_area", against="nominal_pressure", log=True)
+    nominal pressure (MPa)
+    >>> ax = fc.plotting.plot(pressed, "contact_area", log=True)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | real / nominal contact area (%)
     >>> print(fc.plotting.plot(pressed["mean_gap"]).get_ylabel())

@@ -38,6 +38,7 @@ NULLS = {
     "null_fraction": (CELLS_NULL, "radius", 2.0, -1.0),
     "spots_fraction": (SPOTS, "side", 2.0, -1.0),
 }
+ENDS = ("low", "high")  # of an interval
 MARKS = {"spot_size": ("spot size", "o"), "gap_size": ("gap size", "s")}
 
 
@@ -114,9 +115,9 @@ def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
                 point = np.array([sizes[i]]), np.array([height]), measured[[i]]
                 panel.flagged(panel.family.curve(title, i), *point, marker=marker, ms=5, **own)
                 if {f"{name}_low", f"{name}_high"} <= path.variables.keys():
-                    ends = (table(path, f"{name}_{end}", (dim,))[[i]] for end in ("low", "high"))
+                    low, high = (panel.x.scale(table(path, f"{name}_{end}", (dim,))[[i]]) for end in ENDS)
                     curve = panel.family.curve(f"{title}, interval", i)
-                    panel.ax.hlines([height], *map(panel.x.scale, ends), label=curve, lw=_style.THIN, **own)
+                    panel.ax.hlines([height], low, high, label=curve, lw=_style.THIN, **own)
             panel.key(title, ls="", marker=marker)
     if not measured.all():
         panel.key("no dimension", ls="", marker="o", mfc=_style.tone(0.0))
@@ -127,8 +128,8 @@ def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
         panel.area_key("window", facecolor=_style.pale())
         name, own = "domain_dimension", panel.family.styles[0]
         if path.sizes[dim] == 1 and {f"{name}_low", f"{name}_high"} <= path.variables.keys():
-            low, high = (float(table(path, f"{name}_{end}", (dim,))[0]) for end in ("low", "high"))
-            panel.band("dimension, interval", window, low, high, own["color"], alpha=0.3)
+            lowest, highest = (float(table(path, f"{name}_{end}", (dim,))[0]) for end in ENDS)
+            panel.band("dimension, interval", window, lowest, highest, own["color"], alpha=0.3)
             panel.area_key("dimension, interval", facecolor=own["color"], alpha=0.3)
 
 
