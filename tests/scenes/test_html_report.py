@@ -249,6 +249,19 @@ def test_tables_hold_every_variable_but_maps(study):
             assert ({"x", "y"} & set(variable.dims)) or name in columns, (node.path, name)
 
 
+def test_flags_are_words_in_the_tables(study, tmp_path):
+    frames = fc.scenes.tables(study[0], tmp_path)
+    for name, group, flag in (
+        ("joints_closure_by_shear_step", "joints/closure", "stop_reason"),
+        ("domains_signature_by_shear_step", "domains/signature", "signature_flag"),
+    ):
+        variable = study[0][f"{group}/{flag}"]
+        words = variable.attrs["flag_meanings"].split()
+        expected = [words[list(variable.attrs["flag_values"]).index(value)] for value in variable.values.flat]
+        assert list(frames[name][flag]) == expected
+        assert list(pd.read_csv(tmp_path / f"{name}.csv")[flag]) == expected
+
+
 def test_table_of_a_curve_equals_the_curve(study):
     closure = study[0]["joints/closure"].to_dataset()
     frame = fc.scenes.tables(study[0])["joints_closure_by_shear_step"]
