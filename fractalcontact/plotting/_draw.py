@@ -45,6 +45,22 @@ SOFTWARE = {"Software": "fractalcontact"}  # of a PNG file: a run overwrites no 
 # of all modules; of several with one file the first with data is drawn
 MODULES = (_ensemble, _closure, _contact_curves, _fields, _strength, _dimensions, _size_curves, _islands)
 FIGURES = tuple(row for module in MODULES for row in module.FIGURES)
+# of files: what the labels of their axes do not say
+CAPTIONS = {
+    "alluvial": "how islands grow and merge",
+    "contact_domains": "where the surface is in contact, as the load grows",
+    "delta_surface": "of the upper face over the lower one",
+    "dimension_curves": "the curves that dimensions are fitted to",
+    "dimensions": "of each method, with its 95 % interval",
+    "directional_roughness": "roughness metric and mean dip over the direction of shear",
+    "islands": "map of the islands of contact",
+    "joint_closure": "letters mark the states of the maps",
+    "joint_contact_domains": "where the faces are in contact, as the load grows",
+    "joint_contact_domains_along_shear": "where the faces are in contact, as the shear grows",
+    "joint_slip_domains": "where the contact sticks and slips",
+    "scans": "a row for each scan",
+    "slip_domains": "where the contact sticks and slips",
+}
 OF_SEVERAL: dict[str, tuple[Drawing, tuple[str, ...]]] = {
     "error_against_time": (_accuracy.error_against_time, ("on_pareto_front",)),
     "dimension_curves": (_dimensions.dimension_curves, tuple(_dimensions.CURVES)),
@@ -274,7 +290,7 @@ def _draw_all(
         with DRAWING_LOCK, drawn_for_files(), Problems(WHERE):
             figure = figure_of(draw_with_band(drawings, members) if members else drawings[0]())
             for file in files[number]:
-                _write(figure, file)
+                _write(figure, file, _caption(figure, CAPTIONS.get(row.file, "")))
             if not small:  # the next one may come before the garbage of this one is collected
                 figure.clear()
 
@@ -313,7 +329,22 @@ def _rows_with_data(tree: xr.DataTree, table: Sequence[StudyFigure]) -> dict[str
     return by_file
 
 
-def _write(figure: Figure, target: Path) -> None:
+def _caption(figure: Figure, more: str) -> str:
+    """Return what a figure shows: the labels of its axes without their units, and `more`."""
+    return "; ".join(dict.fromkeys(filter(None, [*map(_shown_on, figure.axes), more])))
+
+
+def _shown_on(ax: Axes) -> str:
+    """Return what axes show, `normal force F against closure w`; of a map the name beside its colours."""
+    x, y = (re.sub(r" \([^()]*\)$", "", _plain(text)) for text in (ax.get_xlabel(), ax.get_ylabel()))
+    if (x, y) == ("x", "y"):
+        return ""
+    if hasattr(ax, "_colorbar"):
+        return f"map of the {y}"
+    return " against ".join(filter(None, (y, x)))
+
+
+def _write(figure: Figure, target: Path, caption: str) -> None:
     """Write a figure, or its curves if it has any, under a temporary name, then rename it."""
     if target.suffix == ".csv":
         numbers = curves(figure.axes)
@@ -333,7 +364,9 @@ def _write(figure: Figure, target: Path) -> None:
         figure.set_layout_engine("none")
     with written_whole(target) as temporary:
         if target.suffix == ".png":
-            canvas.print_png(temporary, metadata=SOFTWARE, pil_kwargs={"compress_level": 2})  # type: ignore[no-untyped-call]
+            canvas.print_png(
+                temporary, metadata={**SOFTWARE, "Description": caption}, pil_kwargs={"compress_level": 2}
+            )  # type: ignore[no-untyped-call]
         else:
             date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
             figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import ROUNDED, spread_indices
-from fractalcontact.base.study import provenance_of
+from fractalcontact.base.study import provenance_of, stated_argument
 from fractalcontact.base.validation import NONE, Problems, require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import Drawing
@@ -40,20 +40,12 @@ def _loads_in_order(data: xr.Dataset) -> list[str]:
 
     A result states it in its provenance; a variable taken out of one has it as an index.
     """
-    stated = [_stated_force(provenance_of(data)), *(name for name in FORCES if name in data.xindexes)]
+    stated = [
+        stated_argument(provenance_of(data), FORCES),
+        *(name for name in FORCES if name in data.xindexes),
+    ]
     prescribed = next(filter(None, stated), FORCES[0])
     return list(dict.fromkeys(["tangential_force", prescribed, *LOADS]))
-
-
-def _stated_force(entry: Any) -> str:
-    """Return the force or pressure of the call of a provenance, else of the calls that made its arguments."""
-    if isinstance(entry, list):
-        return next(filter(None, map(_stated_force, entry)), "")
-    if not isinstance(entry, dict):
-        return ""
-    parameters = entry.get("parameters", {})
-    stated = [name for name in FORCES if isinstance(parameters, dict) and parameters.get(name) is not None]
-    return stated[0] if stated else _stated_force(list(entry.values()))
 
 
 def loads_of(data: xr.Dataset, against: str, dims: tuple[str, str] = PATH) -> Quantity:
