@@ -386,7 +386,7 @@ QUANTITIES: dict[str, Quantity] = {
     **_with_ends("domain_dimension_change", "1", "box dimension less that of the state before"),
     "local_dimension_min": Quantity("1", "least local box dimension in the window"),
     "local_dimension_max": Quantity("1", "greatest local box dimension in the window"),
-    "spots_dimension": Quantity("1", "box dimension of random spots of equal area, widths and number"),
+    "spots_dimension": Quantity("1", "box dimension of random spots of equal area, perimeter and number"),
     **_with_ends("excess_dimension", "1", "box dimension less that of random spots"),
     **_with_ends("excess_dimension_change", "1", "excess dimension less that of the state before"),
     **_with_ends("clustering", "1", "squares that meet random spots over those that meet the set"),

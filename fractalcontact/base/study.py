@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -55,6 +56,20 @@ def provenance_of(data: Any) -> dict[str, Any]:
     except (AttributeError, TypeError, ValueError):
         return {}
     return entry if isinstance(entry, dict) else {}
+
+
+def stated_argument(entry: Any, names: Sequence[str]) -> str:
+    """Return which of some arguments the call of a provenance states, else one that made its arguments.
+
+    Of several the first of `names`; empty where none is stated.
+    """
+    if isinstance(entry, list):
+        return next(filter(None, (stated_argument(each, names) for each in entry)), "")
+    if not isinstance(entry, dict):
+        return ""
+    parameters = entry.get("parameters")
+    stated = [name for name in names if isinstance(parameters, dict) and parameters.get(name) is not None]
+    return stated[0] if stated else stated_argument(list(entry.values()), names)
 
 
 def scene_of(data: Any) -> dict[str, Any]:

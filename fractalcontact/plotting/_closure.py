@@ -13,6 +13,7 @@ from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._fields import MAPS
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
+    as_dataset,
     extent_of,
     nearest,
     quantity,
@@ -38,23 +39,29 @@ def closure_laws(
     marked: Sequence[int] = (),
     key: bool = True,
     log: bool = False,
+    against: str | None = None,
     units: Units | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw normal force against closure, one curve per shear displacement.
+    """Draw the load against closure, one curve per shear displacement.
+
+    It is the normal force, or the nominal pressure where that was prescribed; `against` names another load.
 
     Thin lines show the total closure w, thick lines the interface closure w_int = w - w_b, where w_b is the
     closure of the two bodies. With `laws` points are the interface closures against the nominal pressure, of
     the first loading and beyond; the law that they prefer is a thick line, the other a thin one.
     """
     if laws is not None:
+        known = (None, "nominal_pressure")
+        require(against in known, "against", "nominal_pressure, that of the laws", against)
         return _draw_laws(result, laws, key, log, units, ax)
-    names = ("closure", "normal_force")
-    data = result_of(result, names, _paths.PATH, units)
+    load = against or _paths.force_of(as_dataset(result))
+    data = result_of(result, ("closure", load), _paths.PATH, units)
+    loads = _paths.loads_of(data, load)
     with Problems("fc.plotting") as problems:
         last = data.sizes["step"] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
-    panel = LinePanel.of(ax, data, *names, _paths.PATH, _paths.by_shear(data), x_name="closure")
+    panel = LinePanel.of(ax, data, "closure", loads, _paths.PATH, _paths.by_shear(data), x_name="closure")
     inner = "interface_closure" if "interface_closure" in data else "closure"
     if inner == "interface_closure":
         panel.curves("interface closure", x=inner, key=r"interface, $w_\mathrm{int}$")

@@ -14,7 +14,7 @@ from fractalcontact.base.units import Scale
 from fractalcontact.base.validation import require
 from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
-from fractalcontact.plotting._inputs import quantity, require_dims, result_of, table, words
+from fractalcontact.plotting._inputs import as_dataset, quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._paths import PATH
 from fractalcontact.plotting._style import Axes, AxesArray, Panels, needs_log_axis
@@ -28,7 +28,7 @@ OF_THEORY = {"contact_stiffness": "interface_stiffness", "stiffness": "interface
 def contact_area(
     result: Any,
     *,
-    against: str = "normal_force",
+    against: str | None = None,
     theory: Any = None,
     log: bool = False,
     units: Units | None = None,
@@ -40,6 +40,7 @@ def contact_area(
     which is too high because a cell that is partly in contact counts fully (Yastrebov, Anciaux and Molinari
     2017, Journal of the Mechanics and Physics of Solids 107).
     """
+    against = against or _paths.force_of(as_dataset(result))
     data = result_of(result, ("contact_fraction", against), PATH, units)
     loads, shears, name = _paths.loads_of(data, against), _paths.by_shear(data), "real / nominal contact area"
     panel = LinePanel.of(ax, data, loads, "contact_fraction", PATH, shears, y_name=name)

@@ -45,6 +45,22 @@ SOFTWARE = {"Software": "fractalcontact"}  # of a PNG file: a run overwrites no 
 # of all modules; of several with one file the first with data is drawn
 MODULES = (_ensemble, _closure, _contact_curves, _fields, _strength, _dimensions, _size_curves, _islands)
 FIGURES = tuple(row for module in MODULES for row in module.FIGURES)
+# of files: what the labels of their axes do not say
+CAPTIONS = {
+    "alluvial": "how islands grow and merge",
+    "contact_domains": "where the surface is in contact, as the load grows",
+    "delta_surface": "of the upper face over the lower one",
+    "dimension_curves": "the curves that dimensions are fitted to",
+    "dimensions": "of each method, with its 95 % interval",
+    "directional_roughness": "roughness metric and mean dip over the direction of shear",
+    "islands": "map of the islands of contact",
+    "joint_closure": "letters mark the states of the maps",
+    "joint_contact_domains": "where the faces are in contact, as the load grows",
+    "joint_contact_domains_along_shear": "where the faces are in contact, as the shear grows",
+    "joint_slip_domains": "where the contact sticks and slips",
+    "scans": "a row for each scan",
+    "slip_domains": "where the contact sticks and slips",
+}
 OF_SEVERAL: dict[str, tuple[Drawing, tuple[str, ...]]] = {
     "error_against_time": (_accuracy.error_against_time, ("on_pareto_front",)),
     "dimension_curves": (_dimensions.dimension_curves, tuple(_dimensions.CURVES)),
@@ -97,8 +113,8 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
         path of load or shear; numbers alone have none. The kinds, with their options and the functions whose
         results have them as the standard:
 
-        - closure (`laws`, `shear`, `marked`, `key`, `log`): normal force against total (thin) and interface
-          closure; with `laws` of `joints.closure_laws` these through its steps. `contact.press`,
+        - closure (`laws`, `shear`, `marked`, `key`, `log`, `against`): load against total (thin) and
+          interface closure; with `laws` of `joints.closure_laws` these through its steps. `contact.press`,
           `joints.closure`.
         - contact_area (`against`, `theory`, `log`): share in contact, corrected for the perimeter and as
           counted (dashed), with the curves of `contact.theories`.
@@ -120,11 +136,12 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
         Figures with a function of their own, such as `dilatancy`, are kinds too.
     **options
         `units` by name of a variable, `ax` or `axes` to draw into, and those of the kind. `shear` (m) and
-        `normal_force` (N) choose the nearest state; `against` is normal_force, nominal_pressure or closure;
-        `marked` are steps to mark A, B, C ... at that shear; `key` (bool) is the legend of the shears; `log`
-        (bool) shows every decade, of contact_area with a line proportional to the load; `panels` is the
-        largest number of maps; `zoom` is 0 for no window, and None for one where cells are hard to see;
-        `theory` is from `contact.theories`, `beside` another shear curve or test.
+        `normal_force` (N) choose the nearest state; `against` is normal_force, nominal_pressure or closure,
+        by default the force or pressure that was prescribed; `marked` are steps to mark A, B, C ... at that
+        shear; `key` (bool) is the legend of the shears; `log` (bool) shows every decade, of contact_area with
+        a line proportional to the load; `panels` is the largest number of maps; `zoom` is 0 for no window,
+        and None for one where cells are hard to see; `theory` is from `contact.theories`, `beside` another
+        shear curve or test.
 
     Returns
     -------
@@ -143,8 +160,8 @@ def plot(result: Any, kind: str | None = None, **options: Any) -> Any:
     >>> surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
     >>> print(fc.plotting.plot(pressed).get_ylabel())
-    normal force $F$ (N)
-    >>> ax = fc.plotting.plot(pressed, "contact_area", against="nominal_pressure", log=True)
+    nominal pressure (MPa)
+    >>> ax = fc.plotting.plot(pressed, "contact_area", log=True)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     nominal pressure (MPa) | real / nominal contact area (%)
     >>> print(fc.plotting.plot(pressed["mean_gap"]).get_ylabel())
@@ -273,7 +290,7 @@ def _draw_all(
         with DRAWING_LOCK, drawn_for_files(), Problems(WHERE):
             figure = figure_of(draw_with_band(drawings, members) if members else drawings[0]())
             for file in files[number]:
-                _write(figure, file)
+                _write(figure, file, _caption(figure, CAPTIONS.get(row.file, "")))
             if not small:  # the next one may come before the garbage of this one is collected
                 figure.clear()
 
@@ -312,7 +329,22 @@ def _rows_with_data(tree: xr.DataTree, table: Sequence[StudyFigure]) -> dict[str
     return by_file
 
 
-def _write(figure: Figure, target: Path) -> None:
+def _caption(figure: Figure, more: str) -> str:
+    """Return what a figure shows: the labels of its axes without their units, and `more`."""
+    return "; ".join(dict.fromkeys(filter(None, [*map(_shown_on, figure.axes), more])))
+
+
+def _shown_on(ax: Axes) -> str:
+    """Return what axes show, `normal force F against closure w`; of a map the name beside its colours."""
+    x, y = (re.sub(r" \([^()]*\)$", "", _plain(text)) for text in (ax.get_xlabel(), ax.get_ylabel()))
+    if (x, y) == ("x", "y"):
+        return ""
+    if hasattr(ax, "_colorbar"):
+        return f"map of the {y}"
+    return " against ".join(filter(None, (y, x)))
+
+
+def _write(figure: Figure, target: Path, caption: str) -> None:
     """Write a figure, or its curves if it has any, under a temporary name, then rename it."""
     if target.suffix == ".csv":
         numbers = curves(figure.axes)
@@ -332,7 +364,9 @@ def _write(figure: Figure, target: Path) -> None:
         figure.set_layout_engine("none")
     with written_whole(target) as temporary:
         if target.suffix == ".png":
-            canvas.print_png(temporary, metadata=SOFTWARE, pil_kwargs={"compress_level": 2})  # type: ignore[no-untyped-call]
+            canvas.print_png(
+                temporary, metadata={**SOFTWARE, "Description": caption}, pil_kwargs={"compress_level": 2}
+            )  # type: ignore[no-untyped-call]
         else:
             date = {".svg": "Date", ".pdf": "CreationDate"}[target.suffix]
             figure.savefig(temporary, format=target.suffix[1:], metadata={date: None})

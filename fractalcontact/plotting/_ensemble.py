@@ -131,6 +131,7 @@ FIRST = {
     "rigid_dilatancy": "largest rigid dilatancy",
     "peak_shear_strength": "largest peak strength",
 }
+MOST_NAMES = 40  # of scans: more do not fit a page
 NOT_SHOWN = ("_low", "_high", "_error")  # endings of variables
 
 
@@ -138,9 +139,10 @@ NOT_SHOWN = ("_low", "_high", "_error")  # endings of variables
 def scans(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw the distribution of the main numbers of many scans: dimension, JRC, rms height, contact area.
 
-    Each panel has one dot for every scan, sorted, with its interval where there is one; the dashed line is
-    the median. Outliers by the modified z of Iglewicz and Hoaglin (beyond 3.5) are red, with their names. A
-    number that is the same for all scans has no panel while others differ, and JRC below its scale no dot.
+    Each scan is a row of all panels, in the order of the first number, with one dot, and its interval where
+    there is one; the dashed line is the median. At most 40 scans are named. Outliers by the modified z of
+    Iglewicz and Hoaglin (beyond 3.5) are red, with their names. A number that is the same for all scans has
+    no panel while others differ, and JRC below its scale no dot.
     """
     data = result_of(result, (), (SCAN,), units)
     if JRC in data:
@@ -151,25 +153,40 @@ def scans(result: Any, *, units: Units | None = None, axes: Panels | None = None
     names = sorted(names, key=lambda name: [*FIRST, name].index(name))
     names = [name for name in names if data[name].max() > data[name].min()] or names
     require(SCAN in result.dims and bool(names), "result", "numbers over scan")
-    shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), (_style.WIDTH, 3.2))
-    for ax, name in zip(shown, names, strict=False):
-        _draw_distribution(ax, data, name)
-    shown[0].set_ylabel("scans, sorted")
+    data = data.sortby(names[0]).dropna(SCAN, how="all", subset=names)  # NaN comes last
+    scan_names = [str(name) for name in data[SCAN].values]
+    are_named = len(scan_names) <= MOST_NAMES
+    # inches: a name has letters of .07, and a line of .14
+    size = (_style.WIDTH + 0.07 * max(map(len, scan_names)), max(3.2, 0.7 + 0.14 * len(scan_names)))
+    size = size if are_named else (_style.WIDTH, 3.2)
+    shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), size)
+    panels = [_draw_distribution(ax, data, name) for ax, name in zip(shown, names, strict=False)]
+    for ax in shown:
+        ax.set_ylim(-0.7, len(scan_names))  # with the name above the highest
+    if are_named:
+        shown[0].set_yticks(range(len(scan_names)), scan_names)
+    else:
+        shown[0].set_ylabel(f"{len(scan_names)} scans, by {panels[0].x.name}")
+    entries = {entry.get_label(): entry for panel in panels for entry in panel.entries}
+    _style.side_legend(shown[-1], list(entries.values()))
     return shown
 
 
-def _draw_distribution(ax: Any, data: Any, name: str) -> None:
+def _draw_distribution(ax: Any, data: xr.Dataset, name: str) -> LinePanel:
+    """Draw a number of every scan that has it, each in its row."""
     title = FIRST.get(name, str(data[name].attrs.get("long_name", name)).partition(":")[0])
-    data = data.isel({SCAN: np.argsort(data[name].values)[: int(np.isfinite(data[name]).sum())]})
-    rank = np.arange(data.sizes[SCAN])
+    rank = np.flatnonzero(np.isfinite(data[name].values))
+    data = data.isel({SCAN: rank})
     panel = LinePanel.of(ax, data, name, Quantity(rank, PLAIN, ""), (SCAN,), x_name=title)
     x, far = panel.x.values, is_far(panel.x.values)
     if ends := panel.interval(name):
-        lines = {"color": _style.BLUE, "lw": _style.THIN, "alpha": 0.6, "label": "interval"}
-        ax.hlines(rank, *map(panel.x.scale, ends), **lines)
-    panel.line("scan", x[~far], rank[~far], ls="", marker="o", ms=3, color=_style.BLUE)
-    panel.line("outlier", x[far], rank[far], ls="", marker="o", color=_style.RED)
-    panel.place(float(np.median(x)), color=_style.grey(), **_style.DASHED)
+        lines = {"color": _style.BLUE, "lw": _style.THIN, "alpha": 0.6}
+        ax.hlines(rank, *map(panel.x.scale, ends), label="interval", **lines)
+        panel.key("interval", **lines)
+    dots: dict[str, Any] = {"ls": "", "marker": "o"}
+    panel.line("scan", x[~far], rank[~far], ms=3, color=_style.BLUE, **dots)
+    panel.line("outlier", x[far], rank[far], key="outlier" if far.any() else "", color=_style.RED, **dots)
+    panel.place(float(np.median(x)), key="median", color=_style.grey(), **_style.DASHED)
     for place in np.flatnonzero(far)[: _style.MAX_LEGEND_ENTRIES]:
         shown = panel.x.shown[place]
         is_left = shown < np.mean(ax.get_xlim())
@@ -179,7 +196,8 @@ def _draw_distribution(ax: Any, data: Any, name: str) -> None:
             ha="left" if is_left else "right",
         )  # fmt: skip
     ax.set_yticks([])
-    ax.margins(y=0.08)  # of the name of the highest
+    ax.locator_params(axis="x", nbins=4)  # more labels would touch in the narrowest panel
+    return panel
 
 
 FIGURES = (StudyFigure("scans", "overview", "status", scans),)

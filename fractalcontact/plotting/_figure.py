@@ -39,8 +39,8 @@ class StudyFigure(NamedTuple):
 # of options, where the docstring of a figure does not explain them itself
 PARAGRAPHS = {
     "against": """against : str, optional
-    Variable on the x axis: nominal_pressure, normal_force, closure or shear. Default: the first of the
-    loads that the result has, or shear where it has a single step.""",
+    Variable on the x axis: nominal_pressure, normal_force, closure or shear. Default: the load that was
+    prescribed, or shear where the result has a single step.""",
     "shear": """shear : float, optional
     Shear displacement (m) of the load path; the nearest one is taken. Default: the middle one.""",
     "normal_force": """normal_force : float, optional

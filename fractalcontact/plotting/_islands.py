@@ -14,7 +14,6 @@ from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
     as_dataset,
-    nearest,
     require_dims,
     require_known_dims,
     result_of,
@@ -56,19 +55,32 @@ def islands(result: Any, *, units: Units | None = None, axes: Panels | None = No
     require_dims(data, {"area": "island"})
     require_known_dims(data, {"area": ("island", *SEVERAL)})
     left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.2), width_ratios=(1, 1.15))
-    _maps.draw_labels(left, _last_map(data["label"]))
+    place = _last_map(data["label"])
+    _maps.draw_labels(left, data["label"].isel(place).transpose("y", "x"))
+    lines = [_maps.count_text(data["label"].isel(place)), ", ".join(_state_texts(data, place))]
+    left.set_title("\n".join(filter(None, lines)))
     _draw_areas(right, data)
     return shown
 
 
-def _last_map(plane: xr.DataArray) -> xr.DataArray:
-    """Return the last map that has an island, or the last map if none has."""
-    leading = [dim for dim in plane.dims if dim not in ("y", "x")]
-    if leading:
-        masks = plane.stack(mask=leading, create_index=False)
-        filled = np.flatnonzero((masks > 0).any(("y", "x")).values)
-        plane = masks.isel(mask=int(filled[-1]) if filled.size else -1)
-    return plane.transpose("y", "x")
+def _last_map(plane: xr.DataArray) -> dict[str, int]:
+    """Return the place of the last map that has an island, or of the last map if none has."""
+    leading = [str(dim) for dim in plane.dims if dim not in ("y", "x")]
+    filled = np.argwhere((plane > 0).any(("y", "x")).values)
+    last = filled[-1] if filled.size else [plane.sizes[dim] - 1 for dim in leading]
+    return dict(zip(leading, map(int, last), strict=True))
+
+
+def _state_texts(data: xr.Dataset, place: dict[str, int]) -> list[str]:
+    """Return which of several masks one is: its shear and its load, or its number along a dim."""
+    state = data.isel(place)
+    texts = {"shear": _paths.shear_text(state, data), "step": _paths.load_text(state, data)}
+    several = {dim: number for dim, number in place.items() if data.sizes[dim] > 1}
+    return [texts.get(dim) or _number_text(state, dim, number) for dim, number in several.items()]
+
+
+def _number_text(state: xr.Dataset, dim: str, number: int) -> str:
+    return f"{dim} {state[dim].item() if dim in state.coords else number}"
 
 
 def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
@@ -94,20 +106,27 @@ def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
 def _masks_of(data: xr.Dataset) -> tuple[Family, list[Any]]:
     """Return for each mask the places of its islands, and what distinguishes the masks.
 
-    Masks along one path of load or of shear are labelled by it, others are not.
+    Masks along one path of load or of shear are labelled by it, others by all that distinguishes them.
     """
     names = [dim for dim in SEVERAL if f"island_{dim}" in data.coords]
     if not names:
         return ordered((), count=1), [slice(None)]
-    columns = [np.unique(data[f"island_{dim}"].values, return_inverse=True) for dim in names]
-    _, group = np.unique(np.stack([inverse for _, inverse in columns], -1), axis=0, return_inverse=True)
-    groups = [np.flatnonzero(group.ravel() == number) for number in range(group.max(initial=-1) + 1)]
-    family = ordered((), count=len(groups))
-    if len(names) == 1 and names[0] in ("shear", "step") and names[0] in data.coords:
+    columns = [_places(data, dim) for dim in names]
+    masks, group = np.unique(np.stack(columns, -1), axis=0, return_inverse=True)
+    groups = [np.flatnonzero(group.ravel() == number) for number in range(len(masks))]
+    if len(names) == 1 and names[0] in ("shear", "step"):
         every = (_paths.by_shear if names[0] == "shear" else _paths.by_load)(data)
-        places = [nearest(data[names[0]], value) for value in columns[0][0]]
-        family = ordered([every.labels[place] for place in places], every.name, every.unit)
-    return family, groups
+        return ordered([every.labels[place] for (place,) in masks], every.name, every.unit), groups
+    places = [dict(zip(names, map(int, mask), strict=True)) for mask in masks]
+    return ordered([", ".join(_state_texts(data, place)) for place in places]), groups
+
+
+def _places(data: xr.Dataset, dim: str) -> Array:
+    """Return for each island its place along a dim of the masks."""
+    values = data[f"island_{dim}"].values
+    if dim not in data.coords:
+        return values.astype(np.int64)
+    return np.array([np.flatnonzero(data[dim].values == value)[0] for value in values], np.int64)
 
 
 @figure

@@ -171,8 +171,13 @@ def draw_labels(ax: Axes, plane: xr.DataArray, count: int = 12) -> None:
     image[labels <= 0] = matplotlib.colors.to_rgb(_style.OPEN_COLOUR)
     draw_image(ax, image, plane)
     label_axes(ax, plane)
-    islands = np.unique(labels[labels > 0]).size
-    ax.set_title(f"{islands} island{'' if islands == 1 else 's'}")
+    ax.set_title(count_text(plane))
+
+
+def count_text(labels: xr.DataArray) -> str:
+    """Return the number of islands of a map of labels in words."""
+    islands = np.unique(labels.values[labels.values > 0]).size
+    return f"{islands} island{'' if islands == 1 else 's'}"
 
 
 def draw_image(ax: Axes, image: Array, plane: xr.DataArray) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import ROUNDED, spread_indices
+from fractalcontact.base.study import provenance_of, stated_argument
 from fractalcontact.base.validation import NONE, Problems, require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import Drawing
@@ -20,9 +21,31 @@ PATH = ("shear", "step")
 LOADS = {"tangential_force": "$Q$", "normal_force": "$F$", "nominal_pressure": "$p$", "closure": "$w$"}
 
 
+FORCES = ("normal_force", "nominal_pressure")  # every result of a press has both
+
+
 def load_of(data: xr.Dataset) -> str:
     """Return the name of the variable that holds the load of a step; empty if there is none."""
-    return next((name for name in LOADS if name in data.variables), "")
+    return next((name for name in _loads_in_order(data) if name in data.variables), "")
+
+
+def force_of(data: xr.Dataset) -> str:
+    """Return the force or the pressure on the block: what the call prescribed, the force if neither."""
+    forces = [name for name in _loads_in_order(data) if name in FORCES]
+    return next((name for name in forces if name in data.variables), forces[0])
+
+
+def _loads_in_order(data: xr.Dataset) -> list[str]:
+    """Return the names of loads, of force and pressure the one first that was prescribed.
+
+    A result states it in its provenance; a variable taken out of one has it as an index.
+    """
+    stated = [
+        stated_argument(provenance_of(data), FORCES),
+        *(name for name in FORCES if name in data.xindexes),
+    ]
+    prescribed = next(filter(None, stated), FORCES[0])
+    return list(dict.fromkeys(["tangential_force", prescribed, *LOADS]))
 
 
 def loads_of(data: xr.Dataset, against: str, dims: tuple[str, str] = PATH) -> Quantity:
@@ -39,7 +62,7 @@ def loads_of(data: xr.Dataset, against: str, dims: tuple[str, str] = PATH) -> Qu
 def path_axis(data: xr.Dataset, against: str | None) -> tuple[tuple[str, str], Quantity, Family]:
     """Return the dims of curves along a path, the variable they are drawn against, and their family.
 
-    Without `against` it is the first load that the result has, or shear where it has a single step.
+    Without `against` it is the load of `load_of`, or shear where the result has a single step.
     """
     if against is None:
         by_step = data.sizes["step"] > 1 or "shear" not in data.coords
@@ -51,7 +74,7 @@ def path_axis(data: xr.Dataset, against: str | None) -> tuple[tuple[str, str], Q
 
 def by_load(data: xr.Dataset) -> Family:
     """Return the family of the curves of the steps, labelled by their load or by their number."""
-    for name in LOADS:
+    for name in _loads_in_order(data):
         if name in data.variables and data[name].dims in (("step",), ()):
             scale = scale_of(data[name])
             return ordered(number_texts(scale, data[name], 3), name_of(data[name]), scale.unit)
@@ -69,7 +92,7 @@ def by_shear(data: xr.Dataset) -> Family:
 
 def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
     """Return the load of a state, `F = 30 kN`, in the unit of the path; empty if it is not uniform."""
-    for name, symbol in LOADS.items():
+    for name in _loads_in_order(state if path is None else path):
         if name not in state.variables:
             continue
         values = np.atleast_1d(state[name].values).ravel()
@@ -77,7 +100,7 @@ def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
         if values.size == 0 or np.ptp(values) > 5e-3 * abs(values[0]):
             continue
         scale = scale_of((state if path is None else path)[name])
-        return f"{symbol} = {float(scale(values[0])):.3g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
+        return f"{LOADS[name]} = {float(scale(values[0])):.3g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
     return ""
 
 

@@ -21,7 +21,7 @@ from fractalcontact.plotting._inputs import (
     result_of,
     table,
 )
-from fractalcontact.plotting._line_panel import Family, LinePanel
+from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel
 from fractalcontact.plotting._paths import PATH, StatePath
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units
@@ -38,6 +38,7 @@ NULLS = {
     "null_fraction": (CELLS_NULL, "radius", 2.0, -1.0),
     "spots_fraction": (SPOTS, "side", 2.0, -1.0),
 }
+ENDS = ("low", "high")  # of an interval
 MARKS = {"spot_size": ("spot size", "o"), "gap_size": ("gap size", "s")}
 
 
@@ -54,8 +55,8 @@ def signature(
 
     A power law holds where a curve is level. Dashed lines show the random null. On the curves of a signature
     a circle marks the spot size and a square the gap size; they are hollow for a state that has no dimension
-    of its own (`signature_flag`), and the common window of the dimensions is shaded. At most six curves are
-    drawn.
+    of its own (`signature_flag`), thin bars are their intervals, and the common window of the dimensions is
+    shaded; of a single curve the interval of its dimension is, too. At most six curves are drawn.
 
     Parameters
     ----------
@@ -113,6 +114,10 @@ def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
                     height = np.interp(np.log(sizes[i]), places, panel.y.values[i], np.nan, np.nan)
                 point = np.array([sizes[i]]), np.array([height]), measured[[i]]
                 panel.flagged(panel.family.curve(title, i), *point, marker=marker, ms=5, **own)
+                if {f"{name}_low", f"{name}_high"} <= path.variables.keys():
+                    low, high = (panel.x.scale(table(path, f"{name}_{end}", (dim,))[[i]]) for end in ENDS)
+                    curve = panel.family.curve(f"{title}, interval", i)
+                    panel.ax.hlines([height], low, high, label=curve, lw=_style.THIN, **own)
             panel.key(title, ls="", marker=marker)
     if not measured.all():
         panel.key("no dimension", ls="", marker="o", mfc=_style.tone(0.0))
@@ -121,6 +126,11 @@ def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
     if window.size == 2 and np.isfinite(window).all():
         panel.ax.axvspan(*panel.x.scale(window), color=_style.pale(), lw=0, zorder=0)
         panel.area_key("window", facecolor=_style.pale())
+        name, own = "domain_dimension", panel.family.styles[0]
+        if path.sizes[dim] == 1 and {f"{name}_low", f"{name}_high"} <= path.variables.keys():
+            lowest, highest = (float(table(path, f"{name}_{end}", (dim,))[0]) for end in ENDS)
+            panel.band("dimension, interval", window, lowest, highest, own["color"], alpha=0.3)
+            panel.area_key("dimension, interval", facecolor=own["color"], alpha=0.3)
 
 
 @figure
@@ -135,8 +145,8 @@ def lacunarity(
 ) -> AxesArray:
     r"""Draw gliding-box lacunarity against box size, for increasing load and for increasing shear.
 
-    Dashed lines show the random null: randomly placed cells of equal coverage. At most six curves are drawn;
-    with `maps` all states are, as colours over load or shear and box size.
+    Bands show the intervals, dashed lines the random null: randomly placed cells of equal coverage. At most
+    six curves are drawn; with `maps` all states are, as colours over load or shear and box size.
 
     Parameters
     ----------
@@ -202,11 +212,24 @@ def _size_curves(
         sizes = sizes_of(states, over)
         panel = LinePanel.of(ax, states, sizes, name, (dim, over), path.family, y_name=title)
         panel.curves("contact domain")
+        _draw_interval(panel, name, has_key=ax is shown[-1])
         if f"null_{name}" in states:
             key = null if ax is shown[-1] else ""
             panel.curves("random null", f"null_{name}", key=key, marker="", **_style.DASHED)
         ax.set_title(path.common)
         yield panel, path
+
+
+def _draw_interval(panel: LinePanel, name: str, *, has_key: bool) -> None:
+    """Shade the intervals of the curves of a variable, where the result has them."""
+    ends = panel.interval(name)
+    if not ends:
+        return
+    for number, (own, low, high) in enumerate(zip(panel.family.styles, *ends, strict=True)):
+        curve = panel.family.curve("interval", number)
+        panel.band(curve, panel.x.values, low, high, own["color"])
+    if has_key:
+        panel.area_key("interval", facecolor=_style.grey(), alpha=BAND_OPACITY)
 
 
 def sizes_of(data: xr.Dataset, over: str) -> Quantity:

@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import spread_indices
+from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import Drawing, StudyFigure, figure
@@ -19,7 +20,9 @@ from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel,
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import Quantity, Units, number_texts, scale_of
 
-TESTS = {"peak_shear_strength": "o", "residual_shear_strength": "x"}
+# names and markers of the strengths of a test: its last one is residual only after a long path
+AT_END = "at the end"
+TESTS = {"peak_shear_strength": ("peak", "o"), "residual_shear_strength": (AT_END, "x")}
 
 
 @figure
@@ -35,7 +38,8 @@ def strength_envelope(
     result : Dataset or node of a DataTree
         From `fractalcontact.joints.strength_envelope`.
     tests : Dataset or node of a DataTree, optional
-        From `fractalcontact.joints.direct_shear`; its peak strengths are drawn as points.
+        From `fractalcontact.joints.direct_shear`; its strengths, at the peak and at the end of the first
+        leg, are drawn as points.
     {shared}
 
     Examples
@@ -71,9 +75,11 @@ def strength_envelope(
         panel.key("out of range", **_style.DOTTED)
     if tests is not None:
         tested = result_of(tests, (*TESTS, dims[1]), dims[1:], argument="tests")
-        for name, marker in TESTS.items():
+        ends = np.ravel(provenance_of(tested).get("parameters", {}).get("path", []))
+        place = f" ({quantity_text(ends[0], 'm')})" if ends.size else ""  # of the first leg
+        for name, (kind, marker) in TESTS.items():
             style = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
-            label = f"direct shear, {name.partition('_')[0]}"
+            label = f"direct shear, {kind}{place if kind == AT_END else ''}"
             points = table(tested, dims[1], dims[1:]), table(tested, name, dims[1:])
             panel.line(label, *points, key=label, clip_on=False, **style)
     return panel.finish(zero="xy")

@@ -79,8 +79,8 @@ def _draw_rows(
     parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
     facts = "\n".join([_source(tree), *_input_lines(groups)])
     parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
-    left, right = parts[1].subfigures(1, 2, width_ratios=(1.3, 1.6))
-    left.text(0.08, 0.96, "\n".join(numbers), size=6.0, family="monospace", va="top", linespacing=1.4)
+    left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.05))  # of a line of 74 characters
+    left.text(0.06, 0.96, "\n".join(numbers), size=6.0, family="monospace", va="top", linespacing=1.4)
     if groups["strength_envelope"] is not None:
         panels["strength"] = right.add_subplot()
         _style.style_axes(panels["strength"])

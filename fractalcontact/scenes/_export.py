@@ -43,8 +43,9 @@ def tables(result: xr.DataTree | xr.Dataset, folder: str | os.PathLike[str] | No
     -------
     dict of str to pandas.DataFrame
         By the name of the file without suffix. One row for every point of the dims, one column for every
-        coordinate and variable of these dims, headed by its name and unit: `normal_force (N)`. Numbers
-        without dims are in the table `..._values`. Maps over x and y are left out.
+        coordinate and variable of these dims, headed by its name and unit: `normal_force (N)`. Flags are the
+        words of their `flag_meanings`. Numbers without dims are in the table `..._values`. Maps over x and y
+        are left out.
 
     Raises
     ------
@@ -108,8 +109,19 @@ def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
     variables |= dataset.variables  # a dim may have no coordinate
     columns = (*dims, *coords, *names)
     return DataFrame(
-        {heading(dataset, str(name)): variables[name].set_dims(sizes).values.ravel() for name in columns}
+        {heading(dataset, str(name)): _in_words(variables[name].set_dims(sizes)).ravel() for name in columns}
     )
+
+
+def _in_words(variable: xr.Variable) -> Array:
+    """Return the values of a variable; of flags what they mean."""
+    values: Array = np.asarray(variable.values)
+    if not {"flag_values", "flag_meanings"} <= variable.attrs.keys():
+        return values
+    meanings = str(variable.attrs["flag_meanings"]).split()
+    words = dict(zip(np.ravel(variable.attrs["flag_values"]).tolist(), meanings, strict=True))
+    named = [words.get(value, str(value)) for value in values.ravel().tolist()]
+    return np.array(named, dtype=object).reshape(values.shape)
 
 
 def heading(dataset: xr.Dataset, name: str) -> str:

@@ -26,7 +26,15 @@ from fractalcontact.base.numbers import spread_indices
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CORE_DIMS
-from fractalcontact.base.study import group_of, member_count, of_member, provenance_of, scene_of
+from fractalcontact.base.study import (
+    NO_REFERENCES,
+    group_of,
+    member_count,
+    of_member,
+    provenance_of,
+    scene_of,
+    stated_argument,
+)
 from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes._domain_stages import SIGNATURE
@@ -160,7 +168,7 @@ def page_contents(tree: xr.DataTree) -> dict[str, Any]:
 
 def _page(
     tree: xr.DataTree,
-    figures: Iterable[tuple[str, bytes]],
+    figures: Iterable[tuple[str, str, bytes]],
     summary: Summary,
     contents: Mapping[str, Any],
     target: Path,
@@ -177,17 +185,31 @@ def _page(
         generator=str(tree.attrs.get("source", "fractalcontact")),
         of_member="Member 0 of the ensemble." if member_count(tree) else "",
         figures=[
-            (name.replace("_", " ").capitalize(), base64.b64encode(content).decode())
-            for name, content in figures
+            (name.replace("_", " ").capitalize(), caption, base64.b64encode(content).decode())
+            for name, caption, content in figures
         ],
         summary=summary,
         written_rows=written_rows,
         pages=pages,
         scene=_as_json(scene) if scene else "",
         provenance=_as_json(provenance_of(tree)),
-        references=str(tree.attrs.get("references", "")),
+        input_files=sorted({pair for node in tree.subtree for pair in _input_files(provenance_of(node))}),
+        references=[
+            text for text in str(tree.attrs.get("references", "")).split("; ") if text != NO_REFERENCES
+        ],
         **contents,
     )
+
+
+def _input_files(entry: Any) -> Iterator[tuple[str, str]]:
+    """Yield the name and the SHA-256 of every file that a provenance states, in it and in its arguments."""
+    if isinstance(entry, dict):
+        parameters = entry.get("parameters")
+        if isinstance(entry.get("file_sha256"), str) and isinstance(parameters, dict):
+            yield str(parameters.get("path", parameters.get("name", ""))), entry["file_sha256"]
+        entry = list(entry.values())
+    for each in entry if isinstance(entry, list) else ():
+        yield from _input_files(each)
 
 
 def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:
@@ -355,12 +377,13 @@ def _caption(here: xr.Dataset, flags: Array, meanings: Sequence[str]) -> str:
 def _label(dataset: xr.Dataset, dim: str, place: int) -> str:
     """Return where on one of its axes a map lies: the load of a step, or the value of the coordinate."""
     if dim == "step":
-        for name, symbol in LOADS.items():
+        prescribed = stated_argument(provenance_of(dataset), ("normal_force", "nominal_pressure"))
+        for name in filter(None, dict.fromkeys([prescribed, *LOADS])):
             if name in dataset.variables and "step" in dataset[name].dims:
                 values = dataset[name].isel(step=place)
                 # one load, in the digits that are shown
                 if float(values.max() - values.min()) <= 1e-3 * abs(float(values.max())):
-                    return f"{symbol} = {_value(values.max(keep_attrs=True))}"
+                    return f"{LOADS[name]} = {_value(values.max(keep_attrs=True))}"
         return str(place)
     return _value(dataset[dim][place]) if dim in dataset.coords else str(place)
 
@@ -371,15 +394,16 @@ def _value(scalar: xr.DataArray) -> str:
     return quantity_text(float(scalar), str(scalar.attrs.get("units", "")), 4)
 
 
-def _picture_file(path: Path) -> tuple[str, bytes]:
-    """Return the name of a picture and its content as WebP, which is smaller than PNG."""
+def _picture_file(path: Path) -> tuple[str, str, bytes]:
+    """Return the name of a picture, what it shows, and its content as WebP, which is smaller than PNG."""
     from PIL import Image, WebPImagePlugin  # noqa: F401  for a format it does not know Pillow loads all
 
     content = io.BytesIO()
     with reading(WHERE, path), Image.open(path) as picture:
         # a greater effort (method) saves a tenth, in three times the time
         picture.convert("RGB").save(content, "WEBP", quality=85, method=0)
-    return path.stem, content.getvalue()
+        caption = str(picture.info.get("Description", ""))
+    return path.stem, caption, content.getvalue()
 
 
 def _curve_table(

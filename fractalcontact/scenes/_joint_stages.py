@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.study import MEMBER
+from fractalcontact.base.study import MEMBER, provenance_of
 from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
 from fractalcontact.scenes._result_tables import Column, amount, are_one, at_value, finite, length, plain
 from fractalcontact.scenes._scene import LOADS
@@ -122,6 +122,12 @@ def _strength_over_half(friction: xr.Dataset) -> float | None:
 
 def _peak_distance(state: xr.Dataset) -> str | None:
     return length(state["peak_distance"].max()) if "peak_distance" in state else None
+
+
+def _end_of_first_leg(test: xr.Dataset) -> str | None:
+    """Return the shear at which a test first reverses or stops."""
+    ends = np.ravel(provenance_of(test).get("parameters", {}).get("path", []))
+    return length(ends[0]) if ends.size else None
 
 
 def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:
@@ -439,7 +445,8 @@ STAGES = (
         ("nominal_pressure",),
         Column("peak strength", "peak_shear_strength"),
         Column("friction angle", "peak_friction_angle"),
-        Column("residual strength", "residual_shear_strength"),
+        Column("strength at the end", "residual_shear_strength"),
+        Column("end at shear", _end_of_first_leg, screen=False),
         Column("worn depth", lambda state: state["wear_depth"].max("point", keep_attrs=True)),
         splits=("nominal_pressure",),
         one_direction=True,

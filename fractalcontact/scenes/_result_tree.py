@@ -17,14 +17,13 @@ import xarray as xr
 
 from fractalcontact.base import provenance, schema
 from fractalcontact.base.regression import is_far, random_effects
-from fractalcontact.base.study import MEMBER, group_of, joined_references, provenance_of
+from fractalcontact.base.study import MEMBER, NO_REFERENCES, group_of, joined_references, provenance_of
 from fractalcontact.scenes._joint_stages import JRC_COLUMN
 from fractalcontact.scenes._result_tables import SCAN, Column, ResultTable, Rows, cell, column_scale, table_of
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._study import StudyResults, stacked, total_seconds
 
 Numbers = dict[str, xr.Dataset]
-OWN_REFERENCES = "see the references of each group"
 PARTIAL = "partial: "  # start of the attribute `completeness`
 
 
@@ -45,7 +44,9 @@ def result_tree(scene: Scene, study: StudyResults, main: xr.Dataset | None = Non
         "fractalcontact.scenes.run",
         {"scene": _without_folders(scene.tables)},
         title=str(scene.tables.get("title", scene.name)),
-        references=OWN_REFERENCES,
+        references=joined_references(
+            *(str(data.attrs.get("references", NO_REFERENCES)) for data in study.groups.values())
+        ),
         stages={
             name: {
                 "run_time": second,
@@ -102,15 +103,20 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
     of_all = {"residual": xr.DataArray.max, "converged": xr.DataArray.all, "iterations": xr.DataArray.sum}
     facts = {name: reduce(result[name]).item() for name, reduce in of_all.items() if name in result}
     if "standard_error" in result:
-        by_method = np.atleast_1d(result["standard_error"].values)
-        by_method = by_method.reshape(-1, by_method.shape[-1]).T  # the members of an ensemble come first
-        known = [errors[np.isfinite(errors)] for errors in by_method]
-        ends = [dict.fromkeys(f"{end:.4f}" for end in (e.min(), e.max())) for e in known if e.size]
-        facts["standard error of H"] = " ".join(" to ".join(pair) for pair in ends) or "none"
+        facts["standard error of H"] = ", ".join(_errors_by_method(result)) or "none"
     if "interpolation_error" in result and np.isfinite(result["interpolation_error"]).all():
         facts["interpolation error (m)"] = float(result["interpolation_error"].max())
     words = provenance_of(result).get("achieved_error")
     return facts if facts or words is None else {"error": words}
+
+
+def _errors_by_method(estimates: xr.Dataset) -> Iterator[str]:
+    """Yield each method with its standard error; with the ends over the members of an ensemble."""
+    for name in estimates["method"].values:
+        errors = estimates["standard_error"].sel({"method": name}).values
+        known = errors[np.isfinite(errors)]
+        if known.size:
+            yield f"{name} {' to '.join(dict.fromkeys(f'{end:.4f}' for end in (known.min(), known.max())))}"
 
 
 OVERVIEW = "overview"  # group: a row for every scan

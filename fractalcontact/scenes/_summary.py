@@ -236,7 +236,7 @@ SHOWN = {
         "smallest roughness metric",
     ),
     "joints/strength_envelope": (),  # its remarks alone: the page has its curves
-    "joints/direct_shear": ("peak strength", "friction angle", "residual strength"),
+    "joints/direct_shear": ("peak strength", "friction angle", "strength at the end", "end at shear"),
     "joints/uplift": ("uplift", "of the linear diagram"),
     "joints/shear_curve": (),  # its remark: the page has its curves
     "joints/closure_laws": ("preferred law", "seating pressure"),

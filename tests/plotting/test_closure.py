@@ -8,6 +8,7 @@ from plotting_figures import drawn, holds, render
 
 import fractalcontact as fc
 from fractalcontact import plotting
+from fractalcontact.base import provenance
 from fractalcontact.base.errors import InvalidInput
 
 
@@ -21,6 +22,39 @@ def test_closure_laws_curves(closed):
     for v in closed.shear:
         for name in ("closure", "interface_closure"):
             assert holds(curves, closed[name].sel(shear=v), closed.normal_force)
+
+
+@pytest.fixture(scope="module")
+def under_pressure():
+    face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=1.6e-3)
+    return fc.joints.closure(crack, shear=[1e-4, 2e-4], nominal_pressure=[1e5, 3e5, 1e6], keep=["state"])
+
+
+def test_figures_follow_the_load_that_was_prescribed(under_pressure, tmp_path):
+    read = fc.open(fc.save(under_pressure, tmp_path / "closure.nc"))
+    of_domains = fc.domains.box_dimension(provenance.with_provenance(under_pressure, "state"))
+    for result in (under_pressure, read, under_pressure.reset_index("nominal_pressure")):
+        assert plotting.plot(result).get_ylabel() == "nominal pressure (MPa)"
+        assert plotting.plot(result, "contact_area").get_xlabel() == "nominal pressure (MPa)"
+        maps = plotting.plot(result, "contact_domains", shear=1e-4)
+        assert "$p$ = 0.1 MPa" in maps[0].get_title(loc="left")
+    assert plotting.path(under_pressure["mean_gap"]).get_xlabel() == "nominal pressure (MPa)"
+    assert plotting.box_dimension(of_domains)[0].get_xlabel() == "nominal pressure (MPa)"
+    forces = plotting.plot(under_pressure, "contact_area", against="normal_force")
+    assert forces.get_xlabel() == "normal force $F$ (N)"
+
+
+def test_closure_against_the_nominal_pressure(closed):
+    assert plotting.plot(closed).get_ylabel() == "normal force $F$ (kN)"
+    pressure = ("step", closed.normal_force.values / 4e-4, {"units": "Pa"})
+    ax = plotting.plot(closed.assign_coords(nominal_pressure=pressure), against="nominal_pressure")
+    assert ax.get_ylabel() == "nominal pressure (MPa)"
+    for v in closed.shear:
+        assert holds(drawn(ax), closed.closure.sel(shear=v), pressure[1])
+    laws = xr.Dataset()
+    with pytest.raises(InvalidInput, match="against: expected nominal_pressure"):
+        plotting.plot(closed, "closure", laws=laws, against="normal_force")
 
 
 def test_closure_fits_are_the_laws():

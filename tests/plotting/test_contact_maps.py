@@ -34,6 +34,21 @@ def test_load_path_at_chosen_shear():
     assert "1.6 mm" in axes[0].figure.get_suptitle()
 
 
+def test_titles_of_small_shares_stay_apart():
+    state = np.zeros((4, 300, 300), np.int8)
+    state[:, 0, 0] = 1  # 0.0011 %
+    centres = 1e-4 * (np.arange(300) + 0.5)
+    coords = {"step": np.arange(4), "y": centres, "x": centres}
+    coords["normal_force"] = ("step", np.array([1.23e3, 2.34e3, 3.45e3, 4.56e3]))
+    result = label(xr.Dataset({"state": (("step", "y", "x"), state)}, coords))
+    for panels in (2, 3, 4):
+        axes = plotting.plot(result, "contact_domains", zoom=0, panels=panels)
+        render(axes)
+        left, right = (ax._left_title.get_window_extent() for ax in axes[:2])
+        assert "0.0011 % in contact" in axes[0].get_title(loc="left")
+        assert right.x0 - left.x1 > 0.3 * axes[0].figure.dpi  # inches
+
+
 def test_shear_path_at_chosen_force():
     closed = synthetic.closure(synthetic.delta(synthetic.heights(), shears=(8e-4, 1.6e-3, 8e-3)))
     axes = plotting.plot(closed, "contact_domains", normal_force=9e3)

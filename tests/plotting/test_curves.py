@@ -1,5 +1,7 @@
 """The numbers of a figure as a table: those of the result in the units of the axes, with names of curves."""
 
+import itertools
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -91,6 +93,30 @@ def test_scans_are_sorted_with_intervals_and_outliers():
     assert np.allclose(numbers["outlier"], [90])
     assert np.allclose(numbers["interval"][:4], [0.5, 2, 1, 4])
     assert [text.get_text() for text in ax.texts] == ["e.sur"]
+    assert [label.get_text() for label in ax.get_yticklabels()] == [f"{letter}.sur" for letter in "bafdge"]
+    assert [text.get_text() for text in ax.artists[0].get_texts()] == ["interval", "outlier", "median"]
+
+
+def test_a_scan_has_one_row_in_all_panels():
+    names = [f"scan {number}" for number in range(5)]
+    columns = {
+        "fractal_dimension": [2.3, 2.1, np.nan, 2.2, np.nan],
+        "roughness_coefficient": [3.0, 12.0, 7.0, 5.0, np.nan],
+        "rms_height": [1.2345e-5, 1.2346e-5, 1.2347e-5, 1.2348e-5, np.nan],
+    }
+    data = {name: ("scan", values, {"units": "m" if name == "rms_height" else "1"})
+            for name, values in columns.items()}  # fmt: skip
+    axes = plotting.plot(xr.Dataset(data, {"scan": names}), "scans")
+    assert [label.get_text() for label in axes[0].get_yticklabels()] == [names[i] for i in (1, 3, 0, 2)]
+    for ax, values in zip(axes, columns.values(), strict=True):
+        shown = ax.lines[0].get_xdata() * getattr(ax.xaxis, "factor", 1.0)
+        rows = [names.index(axes[0].get_yticklabels()[int(y)].get_text()) for y in ax.lines[0].get_ydata()]
+        assert np.allclose(shown, np.array(values)[rows])
+    axes[0].figure.canvas.draw()
+    for ax in axes:
+        boxes = [label.get_window_extent() for label in ax.get_xticklabels() if label.get_text()]
+        assert len(boxes) >= 2
+        assert all(right.x0 > left.x1 + 4 for left, right in itertools.pairwise(boxes))
 
 
 def test_csv_beside_the_figures(study, tmp_path):

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from copies import copied_command
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
 
 import fractalcontact as fc
 from fractalcontact import plotting
@@ -165,3 +166,16 @@ def test_no_pyplot_and_no_figure_left(tmp_path, study):
     )
     done = copied_command(program=script)
     assert done.returncode == 0, done.stderr
+
+
+def test_every_file_says_what_it_shows(study, tmp_path):
+    files = plotting.draw(study, tmp_path)
+    captions = {}
+    for file in files:
+        with Image.open(file) as picture:
+            captions[file.stem] = picture.info.get("Description")
+    assert len(captions) > 10
+    assert all(captions.values())
+    assert captions["joint_closure"].startswith("normal force F against closure; ")
+    assert captions["surface"] == "map of the height"
+    assert not any("(" in caption for caption in captions.values())  # no units

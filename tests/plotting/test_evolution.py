@@ -177,6 +177,29 @@ def test_states_without_a_dimension_have_hollow_marks_and_the_window_is_shaded(m
     assert {"spot size", "gap size", "no dimension", "window"} <= set(named)
 
 
+def test_intervals_of_a_signature_are_drawn(measured):
+    data = measured.isel(shear=0)
+    (ax,) = plotting.signature(data)
+    numbers = plotting.curves(ax).groupby("curve")["x"].apply(list)
+    for step in range(3):
+        state, inside = data.isel(step=step), f"normal force F = {step + 1} N"
+        for name in ("spot_size", "gap_size"):
+            curve = f"{name.replace('_', ' ')}, interval, {inside}"
+            ends = [float(state[f"{name}_{end}"]) * 1e3 for end in ("low", "high")]
+            if float(state.side[0]) <= float(state[name]) <= float(state.side[-1]):
+                assert numbers[curve] == pytest.approx(ends)
+    assert not [name for name in numbers.index if name.startswith("dimension")]  # of several, which overlap
+    ends = {
+        "window_low": 5e-4,
+        "window_high": 2e-3,
+        "domain_dimension_low": 0.9,
+        "domain_dimension_high": 1.2,
+    }
+    (ax,) = plotting.signature(data.isel(step=1).assign(ends))
+    band = plotting.curves(ax).query("curve == 'dimension, interval'")
+    assert [band[axis].agg(f).item() for axis in "xy" for f in ("min", "max")] == [0.5, 2.0, 0.9, 1.2]
+
+
 def test_windows_that_differ_between_states_are_not_shaded(measured):
     ends = {"window_low": ("step", [1e-4, 2e-4, 3e-4]), "window_high": ("step", [1e-3, 1e-3, 2e-3])}
     (ax,) = plotting.signature(measured.isel(shear=0).assign(ends))

@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 from plotting_figures import OPEN, colours
 
+import fractalcontact as fc
 from fractalcontact import plotting
 from fractalcontact.base.schema import label
 
@@ -40,4 +41,31 @@ def test_several_masks():
     assert np.array_equal(np.all(colours(map_) == OPEN, axis=-1), parts[1].label.values == 0)
     for line, part in zip(curves.lines, parts, strict=True):
         assert np.asarray(line.get_xdata()) * 1e-6 == pytest.approx(np.sort(part.area.values)[::-1])
-    assert [text.get_text() for text in curves.artists[0].get_texts()] == ["10", "30"]
+    assert legend_of(curves) == ["10", "30"]
+    assert map_.get_title(loc="left").endswith("\n$F$ = 30 kN")
+
+
+def legend_of(ax):
+    return [text.get_text() for legend in ax.artists for text in legend.get_texts()]
+
+
+def test_every_curve_and_the_map_name_their_shear_and_load():
+    result = fc.domains.islands(synthetic.closure(synthetic.delta(synthetic.heights())).state, keep=["label"])
+    map_, curves = plotting.islands(result)
+    names = legend_of(curves)
+    assert len(names) == len(set(names)) == len(curves.lines) == 8
+    assert all(name.startswith("$v$ = ") and name.endswith(" kN") for name in names)
+    assert map_.get_title(loc="left").partition("\n")[2] == names[-1] == "$v$ = 8 mm, $F$ = 30 kN"
+    assert [line.get_label() for line in curves.lines] == [f"islands, {name}" for name in names]
+
+
+@pytest.mark.parametrize("dims", [("step",), ("member", "step"), ("member",)])
+def test_masks_without_loads_are_numbered(dims):
+    cells = np.random.default_rng(1).random((*range(2, 2 + len(dims)), 16, 16)) > 0.8
+    centres = {dim: (dim, 1e-4 * (np.arange(16) + 0.5), {"units": "m"}) for dim in ("y", "x")}
+    mask = xr.DataArray(cells, centres, dims=(*dims, "y", "x"))
+    map_, curves = plotting.islands(fc.domains.islands(mask, keep=["label"]))
+    names = legend_of(curves)
+    assert len(set(names) - {"step"}) == len(curves.lines) == np.prod(cells.shape[:-2])
+    last = ", ".join(f"{dim} {size - 1}" for dim, size in zip(dims, cells.shape, strict=False))
+    assert map_.get_title(loc="left").partition("\n")[2] == last

@@ -25,3 +25,15 @@ def test_curves_and_null(closed):
         result.box_length.values
     )
     assert len(by_shear.lines) == 6
+
+
+def test_intervals_are_bands(closed):
+    result = synthetic.lacunarity(closed)
+    ends = {"lacunarity_low": result.lacunarity / 2, "lacunarity_high": result.lacunarity * 3}
+    by_load, _ = plotting.lacunarity(result.assign(ends), shear=8e-3)
+    numbers = plotting.curves(by_load)
+    state = result.sel(shear=8e-3).isel(step=4)
+    band = numbers[numbers["curve"] == "interval, normal force F = 30 kN"]["y"]
+    assert (band.min(), band.max()) == pytest.approx(
+        (float(state.lacunarity.min()) / 2, float(state.lacunarity.max()) * 3)
+    )

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.text import Text
 from plotting_figures import figure_of, render
 
 import fractalcontact as fc
@@ -79,6 +80,23 @@ def test_numbers_are_those_of_the_tables(tree):
     whole = fc.scenes.summary(tree, verbose=True)
     for number in (*numbers, *strengths):
         assert number in whole
+
+
+def test_numbers_end_before_the_strength_begins(tree):
+    panels = fc.scenes.datasheet(tree)
+    page = figure_of(panels)
+    render(page)
+    (numbers,) = (text for text in page.findobj(Text) if text.get_text().startswith("joint roughness"))
+    numbers.set_text("\n".join([numbers.get_text(), 74 * "0"]))  # the longest line
+    left = panels["strength"].get_tightbbox().x0
+    assert numbers.get_window_extent().x1 < left
+
+
+def test_end_of_a_shear_test_is_named(tree):
+    shown = texts(figure_of(fc.scenes.datasheet(tree)))
+    assert "residual" not in shown
+    assert "direct shear, at the end\n(1 mm)" in shown
+    assert re.search(r"1 MPa +\S+ MPa +\S+ ° +\S+ MPa +1 mm", shown)
 
 
 def closures(pressure, *curves):

@@ -1,7 +1,10 @@
 """The report of a study: one HTML file whose surface, maps, tables and links are those of the result."""
 
 import base64
+import hashlib
+import html
 import io
+import itertools
 import json
 import re
 import shutil
@@ -12,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 from PIL import Image
 from study import SOUND, command_here
 
@@ -71,7 +75,7 @@ def page_of(tree, tmp_path):
 
 
 def test_every_run_writes_a_report_with_all_sections(page):
-    assert page.sections == ["surface", "maps", "figures", "summary", "tables", "scene-and-provenance"]
+    assert page.sections == ["summary", "surface", "maps", "figures", "tables", "scene-and-provenance"]
 
 
 def test_report_needs_no_network(study, page):
@@ -86,6 +90,43 @@ def test_every_figure_is_embedded(study, page):
     assert len(figures) == len(list(study[1].glob("*.png"))) > 3
 
 
+def test_caveats_come_before_every_figure(study, page):
+    text = (study[1] / "report.html").read_text(encoding="utf-8")
+    assert "#caveats" in page.links
+    assert text.index('id="caveats"') < text.index("<figure")
+
+
+def test_captions_are_those_of_the_files(study, tmp_path):
+    text = {"Description": "force <F> against closure \N{GREEK SMALL LETTER DELTA}"}
+    files = [tmp_path / "with_words.png", tmp_path / "without.png"]
+    for file, metadata in zip(files, (text, {}), strict=True):
+        Figure((1.0, 1.0)).savefig(file, metadata=metadata)
+    page = fc.scenes.report(study[0], tmp_path / "page.html", figures=files).read_text(encoding="utf-8")
+    shown = re.findall(r"<figcaption><strong>(.*?)</strong>(.*?)</figcaption>", page)
+    assert shown == [("With words", f": {html.escape(text['Description'])}"), ("Without", "")]
+
+
+def test_references_are_those_of_the_groups(study):
+    text = (study[1] / "report.html").read_text(encoding="utf-8")
+    listed = re.findall("<li>([^<]*)</li>", text.partition("<h3>References</h3>")[2])
+    own = [
+        node.attrs["references"].split("; ") for node in study[0].descendants if "references" in node.attrs
+    ]
+    expected = [text for text in dict.fromkeys(itertools.chain(*own)) if text != "none"]
+    assert [html.unescape(each) for each in listed] == expected
+
+
+def test_input_files_are_listed_with_their_checksum(tmp_path):
+    scan = fc.save(
+        fc.surfaces.fbm((16, 16), 1e-4, hurst=0.7, rms_increment=1e-6, rng=1), tmp_path / "scan.nc"
+    )
+    described = fc.surfaces.describe(fc.surfaces.read(scan))
+    tree = xr.DataTree.from_dict({"/surfaces/description": described})
+    text = fc.scenes.report(tree, tmp_path / "page.html", figures=[]).read_text(encoding="utf-8")
+    digest = hashlib.sha256(scan.read_bytes()).hexdigest()
+    assert re.search(rf'<th scope="row">scan.nc</th><td><code>{digest}</code>', text)
+
+
 def test_maps_are_those_of_the_result(study, page):
     state = study[0]["joints/closure/state"]
     (maps,) = [each for each in page.data["map-data"] if len(each["axes"]) == state.ndim - 2]
@@ -95,6 +136,14 @@ def test_maps_are_those_of_the_result(study, page):
     for picture, expected in zip(maps["pictures"], flags, strict=True):
         shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(picture))))
         np.testing.assert_array_equal(shown[::-1], expected)
+
+
+def test_maps_are_labelled_by_the_load_that_was_prescribed(tmp_path):
+    face = fc.surfaces.fbm((16, 16), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
+    for load, label in (("nominal_pressure", "p = 2 MPa"), ("normal_force", "F = 2 MN")):
+        pressed = fc.contact.press(face, contact_modulus=1e9, **{load: [1e6, 2e6]}, keep=("state",))
+        (maps,) = page_of(xr.DataTree.from_dict({"/contact": pressed}), tmp_path).data["map-data"]
+        assert maps["axes"][0]["labels"][1] == label
 
 
 def points(polyline):
@@ -247,6 +296,19 @@ def test_tables_hold_every_variable_but_maps(study):
     for node in tree.subtree:
         for name, variable in node.data_vars.items():
             assert ({"x", "y"} & set(variable.dims)) or name in columns, (node.path, name)
+
+
+def test_flags_are_words_in_the_tables(study, tmp_path):
+    frames = fc.scenes.tables(study[0], tmp_path)
+    for name, group, flag in (
+        ("joints_closure_by_shear_step", "joints/closure", "stop_reason"),
+        ("domains_signature_by_shear_step", "domains/signature", "signature_flag"),
+    ):
+        variable = study[0][f"{group}/{flag}"]
+        words = variable.attrs["flag_meanings"].split()
+        expected = [words[list(variable.attrs["flag_values"]).index(value)] for value in variable.values.flat]
+        assert list(frames[name][flag]) == expected
+        assert list(pd.read_csv(tmp_path / f"{name}.csv")[flag]) == expected
 
 
 def test_table_of_a_curve_equals_the_curve(study):

@@ -105,7 +105,7 @@ def test_results_are_those_of_the_functions(scene, tmp_path):
     for name in ("strength_envelope.png", "shear_curve.png"):
         assert (tmp_path / "out" / name).is_file()
     summary = fc.scenes.summary(tree)
-    assert "residual strength" in summary
+    assert "strength at the end" in summary
     again = fc.scenes.reproduce(stored.to_dataset())
     np.testing.assert_array_equal(again.shear_stress, stored.shear_stress)
 

@@ -122,7 +122,20 @@ def test_standard_errors_of_the_members_are_a_span(ensemble):
     line = next(
         line for line in fc.scenes.summary(ensemble, verbose=True).splitlines() if "error of H" in line
     )
-    assert line.split("standard error of H ")[1].strip() == " to ".join(ends)
+    method = ensemble["dimensions"]["method"].values[0]
+    assert line.split("standard error of H ")[1].strip() == f"{method} {' to '.join(ends)}"
+
+
+def test_standard_errors_name_their_method(tmp_path):
+    scene = tmp_path / "study.toml"
+    start = SOUND.partition("[material]")[0]
+    scene.write_text(f"{start}[want]\ndimensions = ['variogram', 'spectrum']\n", encoding="utf-8")
+    tree = fc.scenes.run(scene, progress=False)
+    errors = tree["dimensions"].standard_error
+    expected = [f"{name} {errors.sel({'method': name}).item():.4f}" for name in errors["method"].values
+                if np.isfinite(errors.sel({"method": name}))]  # fmt: skip
+    assert expected
+    assert f"standard error of H {', '.join(expected)}" in fc.scenes.summary(tree, verbose=True)
 
 
 def test_single_study_names_no_members(ensemble):

@@ -77,7 +77,7 @@ print(signature["reason"].values)
 
 # %%
 # The local slopes d(s) of the three states at each grid (thin: 128 cells; thick: 512): they coincide above
-# a few cells. Dashed: random spots of equal area, widths and number.
+# a few cells. Dashed: random spots of equal area, perimeter and number.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(7.6, 3.2), layout="constrained")
 for n, result in signatures.items():
