@@ -98,7 +98,7 @@ def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
         group = areas[groups[number]]
         ordered_areas = np.sort(group[np.isfinite(group)])[::-1]
         marker = "." if ordered_areas.size <= _style.MOST_DOTS else ""
-        style = family.styles[i] | {"drawstyle": "steps-pre", "marker": marker}
+        style = family.styles[i] | {"drawstyle": "steps-post", "marker": marker}
         panel.line(family.curve("islands", i), ordered_areas, np.arange(1, ordered_areas.size + 1), **style)
     panel.finish(log="xy", empty="no islands")
 

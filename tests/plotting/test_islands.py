@@ -4,6 +4,7 @@ import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
+from matplotlib.cbook import STEP_LOOKUP_MAP
 from plotting_figures import OPEN, colours
 
 import fractalcontact as fc
@@ -69,3 +70,14 @@ def test_masks_without_loads_are_numbered(dims):
     assert len(set(names) - {"step"}) == len(curves.lines) == np.prod(cells.shape[:-2])
     last = ", ".join(f"{dim} {size - 1}" for dim, size in zip(dims, cells.shape, strict=False))
     assert map_.get_title(loc="left").partition("\n")[2] == last
+
+
+def test_the_number_between_two_areas_is_that_of_the_larger_island():
+    mask = np.zeros((20, 20), dtype=bool)
+    mask[1:11, 1:11] = mask[15, 15] = True  # islands of 100 and 1 cells
+    centres = 1e-3 * np.arange(20)
+    result = fc.domains.islands(xr.DataArray(mask, {"y": centres, "x": centres}, ("y", "x")))
+    line = plotting.islands(result)[1].lines[0]
+    areas, numbers = STEP_LOOKUP_MAP[line.get_drawstyle()](*line.get_data())
+    is_level = np.diff(areas) < 0.0
+    assert numbers[:-1][is_level].tolist() == numbers[1:][is_level].tolist() == [1]
