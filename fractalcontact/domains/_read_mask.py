@@ -46,7 +46,7 @@ def read_mask(
     Parameters
     ----------
     path : path
-        The image. Colours are converted to grey values; an opacity channel is ignored.
+        The image. Colours are converted to grey values of their range; opacity is ignored.
     spacing : float, or (y, x)
         Edge of a pixel in metres.
     threshold : float, optional
@@ -108,9 +108,12 @@ def _grey_values(path: Path) -> Array:
     if image.ndim == 3 and image.shape[-1] == 2:  # grey value and opacity
         image = image[..., 0]
     if image.ndim == 3 and image.shape[-1] in (3, 4):
-        image = rgb2gray(image[..., :3])
+        largest = np.iinfo(image.dtype).max if image.dtype.kind in "iu" else 1
+        image = largest * rgb2gray(image[..., :3])  # as those of a grey image of this type
     if image.ndim != 2:
         raise UnreadableFile(path.name, [f"path: expected one image, got an array of shape {image.shape}"])
+    if not np.isfinite(image).all():
+        raise UnreadableFile(path.name, ["path: expected finite grey values, got some that are not"])
     return image.astype(np.float64)
 
 

@@ -80,3 +80,20 @@ def test_inks_are_dark_where_they_are_large(tmp_path, suffix):
     picture.save(tmp_path / f"print{suffix}")
     read = fc.domains.read_mask(tmp_path / f"print{suffix}", 1e-4)
     np.testing.assert_array_equal(read.values[::-1], mask)
+
+
+def test_a_threshold_is_a_grey_value_of_the_file(tmp_path):
+    grey = np.array([[0, 100, 200], [50, 150, 250]], dtype=np.uint8)
+    ski.io.imsave(tmp_path / "grey.png", grey, check_contrast=False)
+    ski.io.imsave(tmp_path / "colour.png", np.stack([grey] * 3, axis=-1), check_contrast=False)
+    masks = [
+        fc.domains.read_mask(tmp_path / name, 1e-4, threshold=128) for name in ("grey.png", "colour.png")
+    ]
+    np.testing.assert_array_equal(masks[0], masks[1])
+    assert masks[0].values.sum() == 3
+
+
+def test_missing_grey_values_are_refused(tmp_path):
+    ski.io.imsave(tmp_path / "gap.tif", np.array([[0.0, np.nan], [1.0, 2.0]], dtype=np.float32))
+    with pytest.raises(UnreadableFile, match="finite grey values"):
+        fc.domains.read_mask(tmp_path / "gap.tif", 1e-4)
