@@ -105,7 +105,7 @@ def from_points(
     -----
     Heights are linear in each triangle. Points on a uniform grid, of which at least half are there, are not
     interpolated, and have no `finest_scale`. Otherwise it is eight point distances, from the mean square of
-    the longest edges over the area, where the power is about 8 % too low, or four spacings of a coarse grid.
+    the longest edges over the area, where the power is about 10 % too low, or four spacings of a coarse grid.
     See page `theory_surfaces`.
 
     References
