@@ -178,23 +178,20 @@ def _pascal(text: str) -> float:
     """Return a pressure in Pa, given as a number or with its unit: `30 GPa`."""
     from fractalcontact.base.units import pascals
 
-    value = pascals(text)
-    if value is None:
-        raise argparse.ArgumentTypeError(
-            f"expected a pressure in Pa, or with its unit (30 GPa), got {text!r}"
-        )
-    return value
+    return _or_refused(pascals(text), "a pressure in Pa, or with its unit (30 GPa)", text)
 
 
 def _metre(text: str) -> float:
     """Return a length in metres, given as a number or with its unit: `0.3 mm`."""
     from fractalcontact.base.units import metres
 
-    value = metres(text)
+    return _or_refused(metres(text), "a length in metres, or with its unit (0.3 mm)", text)
+
+
+def _or_refused(value: float | None, expected: str, text: str) -> float:
+    """Return the value of an option; refuse the option where it has none."""
     if value is None:
-        raise argparse.ArgumentTypeError(
-            f"expected a length in metres, or with its unit (0.3 mm), got {text!r}"
-        )
+        raise argparse.ArgumentTypeError(f"expected {expected}, got {text!r}")
     return value
 
 

@@ -120,7 +120,7 @@ def scaled_slopes(values: Array, spacing: Sequence[float], wraps: Sequence[bool]
 def _basis(shape: tuple[int, ...], order: int, wraps: Sequence[bool]) -> list[tuple[Array, ...]]:
     """Return products of Legendre polynomials on -1 ... 1 for each axis, ordered by degree, then y power.
 
-    They are even along an axis that wraps.
+    They are constant along an axis that wraps.
     """
     axes = [np.polynomial.legendre.legvander(np.linspace(-1.0, 1.0, n), order).T for n in shape]
     highest = [0 if w else order for w in wraps or (False,) * len(shape)]

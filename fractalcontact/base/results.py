@@ -137,12 +137,12 @@ def public_result(
             try:
                 bound = signature.bind(*arguments, **options)
             except TypeError as cause:
-                known = [*signature.parameters, *([SPACING] if takes_spacing else [])]
-                listed = f" (its arguments are {', '.join(known)})"
+                names = [*signature.parameters, *([SPACING] if takes_spacing else [])]
+                listed = f" (its arguments are {', '.join(names)})"
                 hints = [
-                    f"{word!r} is no argument{did_you_mean(word, known) or listed}"
+                    f"{word!r} is no argument{did_you_mean(word, names) or listed}"
                     for word in options
-                    if word not in known
+                    if word not in names
                 ]
                 raise TypeError(f"{name}: {'; '.join(hints) or cause}") from None
             bound.apply_defaults()

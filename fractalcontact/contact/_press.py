@@ -115,7 +115,7 @@ def press(
         corrected_contact_fraction, mean_gap, elastic_energy, plastic_work (with a hardness), iterations,
         transforms, residual, converged, stop_reason, run_time; the maps; nominal_area, contact_modulus,
         rms_slope, disc_radius ("disc"). NaN where a periodic body is closed beyond its mean plane.
-        "stiffness": contact_stiffness (Pa m-1), dp/dclosure of unloading, and relative_conductance (m-1).
+        "stiffness": contact_stiffness (Pa m-1), dp/dclosure of unloading; over E* relative_conductance (m-1).
         "pressure_distribution": maximum_pressure (Pa); over pressure_class area_share and load_share.
 
     Raises

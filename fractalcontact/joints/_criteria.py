@@ -96,9 +96,7 @@ REGRESSIONS = {
 
 # Shear strength
 
-LARGEST_ANGLE = (
-    70.0  # degree: Barton's limit of the total friction angle; no rock joint has been tested beyond
-)
+LARGEST_ANGLE = 70.0  # degree: Barton's limit of the total friction angle
 # degree: JRC = 3.95 t^0.7 - 7.98 of the dip t = theta_max/(C+1) is 0, the smoothest of the standard profiles
 # (Tatone and Grasselli 2010); t is the mean dip where the law of the facets is exact
 SMALLEST_DIP = (7.98 / 3.95) ** (1 / 0.7)

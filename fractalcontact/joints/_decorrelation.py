@@ -117,18 +117,20 @@ def decorrelation_length(
     15.2
     """
     directions = read_directions(direction)
-    given = None if shear is None else float_array(shear)
-    own = [_whole_cell_shears(crack, towards) if given is None else given for towards in directions]
-    shears = np.unique(np.concatenate(own))
+    if shear is None:
+        shears_of = [_whole_cell_shears(crack, towards) for towards in directions]
+    else:
+        shears_of = [float_array(shear)] * len(directions)
+    shears = np.unique(np.concatenate(shears_of))
     rows: list[dict[str, Any]] = []
-    for towards, those in zip(directions, own, strict=True):
-        within = int(np.searchsorted(shears, those[-1])) + 1
+    for towards, own_shears in zip(directions, shears_of, strict=True):
+        within = int(np.searchsorted(shears, own_shears[-1])) + 1
         sums, variance = _crack_sums(crack, shears[:within], towards)
         beyond = np.full(shears.size - within, np.nan)
         correlation = tile_correlation(sums, np.ones(sums[0].shape[1]))
         # from its own shears, so that no length depends on the directions beside it
-        at = np.searchsorted(shears, those)
-        length = estimate_length((sums[0][at], sums[1][at], sums[2][at]), those, min(crack.block))
+        at = np.searchsorted(shears, own_shears)
+        length = estimate_length((sums[0][at], sums[1][at], sums[2][at]), own_shears, min(crack.block))
         curves = {"correlation": correlation, "structure_function": variance}
         rows.append({name: np.append(curve, beyond) for name, curve in curves.items()} | length._asdict())
     result = xr.Dataset(

@@ -143,7 +143,7 @@ def roughness_coefficient(
             cells = _lag_cells(grid.spacing, towards, interval)
             y, x = [0.0, *np.multiply(cells, grid.spacing)][-2:]
             used, azimuth = math.hypot(y, x), math.degrees(math.atan2(y, x)) % 360.0
-            slope, of_profiles = _profile_slopes(heights, grid, cells)
+            slope, of_profiles = _profile_slopes(heights, grid, cells, used)
             fitted = min(REGRESSIONS[regression], key=lambda law: abs(math.log(law.interval / used)))
             rows.append((fitted.coefficient(slope), slope, used, azimuth, fitted.interval))
             # JRC grows with Z2: the quantiles correspond. Below 20 profiles the low one is beyond all but one
@@ -216,17 +216,16 @@ def _lag_cells(spacing: Sequence[float], towards: Direction, lag: float) -> list
     return cells
 
 
-def _profile_slopes(heights: Array, grid: Grid, cells: Sequence[int]) -> tuple[float, Array]:
+def _profile_slopes(heights: Array, grid: Grid, cells: Sequence[int], lag: float) -> tuple[float, Array]:
     """Return the rms slope of all profiles (NaN without any), and of each profile.
 
-    Slopes are between heights a lag of some cells apart, and profiles the lines of cells along it. Those with
-    less than half of the readings of the longest are left out: a short one scatters more.
+    Slopes are between heights some cells apart, the `lag` (m), and profiles the lines of cells along it.
+    Those with less than half of the readings of the longest are left out: a short one scatters more.
     """
     axes = list(zip(cells, grid.periodic, strict=True))
     heights = np.pad(heights, [(max(-n, 0), max(n, 0)) if w else (0, 0) for n, w in axes], mode="wrap")
     ahead = tuple(slice(max(n, 0), size + min(n, 0)) for n, size in zip(cells, heights.shape, strict=True))
     behind = tuple(slice(max(-n, 0), size + min(-n, 0)) for n, size in zip(cells, heights.shape, strict=True))
-    length = math.hypot(*np.multiply(cells, grid.spacing))
     squares = (heights[ahead] - heights[behind]) ** 2
     observed = np.isfinite(squares)
     if not observed.any():
@@ -236,7 +235,7 @@ def _profile_slopes(heights: Array, grid: Grid, cells: Sequence[int]) -> tuple[f
     counts = np.bincount(line)
     long_enough = (counts > 0) & (2 * counts >= counts.max())
     means = np.bincount(line, weights=squares)[long_enough] / counts[long_enough]
-    return math.sqrt(np.mean(squares)) / length, np.sqrt(means) / length
+    return math.sqrt(np.mean(squares)) / lag, np.sqrt(means) / lag
 
 
 def _line_numbers(shape: Sequence[int], cells: Sequence[int], spacing: Sequence[float]) -> Array:

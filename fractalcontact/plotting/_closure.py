@@ -52,8 +52,9 @@ def closure_laws(
     the first loading and beyond; the law that they prefer is a thick line, the other a thin one.
     """
     if laws is not None:
-        known = (None, "nominal_pressure")
-        require(against in known, "against", "nominal_pressure, that of the laws", against)
+        require(
+            against in (None, "nominal_pressure"), "against", "nominal_pressure, that of the laws", against
+        )
         return _draw_laws(result, laws, key, log, units, ax)
     load = against or _paths.force_of(as_dataset(result))
     data = result_of(result, ("closure", load), _paths.PATH, units)

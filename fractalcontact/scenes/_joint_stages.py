@@ -55,7 +55,7 @@ def _extreme(choose: Any, fewest: int) -> Any:
 
 
 def _only_azimuth(data: xr.Dataset) -> str | None:
-    """Return the roughness of the one azimuth that was measured: it is the largest of none."""
+    """Return the roughness of a single azimuth, which is neither the largest nor the smallest."""
     is_one = data["roughness_metric"].sizes.get("azimuth", 1) == 1
     return _extreme(np.nanargmax, 1)(data) if is_one else None
 
