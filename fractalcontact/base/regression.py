@@ -148,14 +148,15 @@ def _project(values: Array, functions: tuple[Array, ...]) -> float:
 
 
 def _subtract(values: Array, basis: list[tuple[Array, ...]], weights: Array) -> None:
-    """Subtract the weighted sum of the basis, row by row: a second array of that size would be slower."""
+    """Subtract the weighted sum of the basis, a few rows at a time: a second array would be slower."""
     lines = values.reshape(-1, values.shape[-1])
     across = np.array(
         [w * np.ones(1) if len(f) == 1 else w * f[0] for w, f in zip(weights, basis, strict=True)]
     )
     along = np.array([f[-1] for f in basis])
-    for line, factors in zip(lines, across.T, strict=True):
-        line -= np.einsum("k,kx->x", factors, along)
+    few = 16
+    for first in range(0, len(lines), few):
+        lines[first : first + few] -= np.einsum("ky,kx->yx", across[:, first : first + few], along)
 
 
 def fitted_slope(scale: Array, value: Array) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.regression import logarithm
+from fractalcontact.base.regression import detrended, logarithm
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, PERIODIC, Curve, curve_dataset
@@ -143,15 +143,8 @@ def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) 
 
 def without_trend(heights: Array, wraps: Sequence[bool]) -> Array:
     """Return complete heights without their least-squares plane, which is level along an axis that wraps."""
-    heights = heights - heights.mean()
-    ny, nx = heights.shape
-    x, y = np.arange(nx) - 0.5 * (nx - 1), np.arange(ny) - 0.5 * (ny - 1)
-    wraps_y, wraps_x = wraps
-    # on a full rectangle the two slopes are independent
-    tilt = np.zeros(1) if wraps_x else np.sum(heights.sum(axis=0) * x) / (ny * np.sum(x * x)) * x
-    is_level = wraps_y or ny == 1
-    rise = np.zeros(1) if is_level else np.sum(heights.sum(axis=1) * y) / (nx * np.sum(y * y)) * y
-    return np.asarray(heights - tilt - rise[:, None])
+    is_level = [w or n == 1 for w, n in zip(wraps, heights.shape, strict=True)]
+    return detrended(heights, 1, is_level)[0]
 
 
 def _tiles(surface: Surface, tile: int | None) -> Iterator[Array]:
