@@ -126,7 +126,8 @@ def partial_slip(
     are up to (2 - nu)/(2 - 2 nu) times the true ones across it, down to 1 - nu/2 times along it. Neither
     method has the change of the pressure between dissimilar bodies. A change of the force below `tolerance`
     times the normal force is not resolved. The stiffness is that of a further step in the same direction,
-    zero where all slides. Periodic bodies are without their bulk: in full contact the stiffness is NaN.
+    zero where all slides ("full": where a loop of the force has just closed it may be that of the loop).
+    Periodic bodies are without their bulk: in full contact the stiffness is NaN.
 
     Examples
     --------

@@ -96,10 +96,15 @@ class Branch:
 
 @dataclass(frozen=True)
 class ShearState:
-    """Loading history of a step: its branches, and the weights and forces L of the loops that have closed."""
+    """Loading history of a step: its branches, and the weights and forces L of the loops that have closed.
+
+    `further` is the force L of the branch that a further step in the same sense follows: where a loop has
+    just closed that is not the last one.
+    """
 
     branches: tuple[Branch, ...]
     closed: tuple[tuple[float, float], ...]
+    further: float
 
 
 def superposition_error(normal: Step, shear: ShearPath) -> float:
@@ -133,12 +138,22 @@ def shear_states(forces: Sequence[float]) -> list[ShearState]:
                 discard_closed_loops(points, closed, at_closure=True)
                 points.append(value)
             discard_closed_loops(points, closed)
-        branches = []
-        for number, (start, stop) in enumerate(pairwise(points)):
-            weight = 2.0 if number else 1.0
-            branches.append(Branch(math.copysign(1.0, stop - start), weight, abs(stop - start) / weight))
-        states.append(ShearState(tuple(branches), tuple(closed)))
+        still_open = list(points)
+        discard_closed_loops(still_open, [], at_closure=True)
+        further = branches_between(still_open)
+        states.append(
+            ShearState(branches_between(points), tuple(closed), further[-1].force if further else 0.0)
+        )
     return states
+
+
+def branches_between(points: Sequence[float]) -> tuple[Branch, ...]:
+    """Return the branches from zero through the reversals to the current force."""
+    branches = []
+    for number, (start, stop) in enumerate(pairwise(points)):
+        weight = 2.0 if number else 1.0
+        branches.append(Branch(math.copysign(1.0, stop - start), weight, abs(stop - start) / weight))
+    return tuple(branches)
 
 
 def discard_closed_loops(
@@ -155,7 +170,7 @@ def discard_closed_loops(
         length = abs(points[-1] - points[-2])
         first = len(points) == 3
         limit = 2 * abs(points[1]) if first else abs(points[-2] - points[-3])
-        if not (length > limit or (at_closure and length == limit)):
+        if length <= limit * (1 + (-FORCE_ROUNDING if at_closure else FORCE_ROUNDING)):
             return
         closed.append((2.0 if first else 4.0, limit / 2))
         del points[-2 if first else -3 : -1]
@@ -169,7 +184,8 @@ def reduced_forces(
     Forces that differ by rounding share one solution.
     """
     numbers, reduced = {0.0: 0}, [normal]
-    for force in sorted({branch.force for state in states for branch in state.branches}):
+    used = {force for state in states for force in (state.further, *(b.force for b in state.branches))}
+    for force in sorted(used - {0.0}):
         value = max(normal - force / friction, 0.0)
         if value <= FORCE_ROUNDING * normal:
             value = 0.0
@@ -216,7 +232,8 @@ class Superposition:
         self.pressure = first.pressure[self.contact]
         self.shear, self.cell_area = shear, cell_area
         self.latest = [numbers[s.branches[-1].force] if s.branches else 0 for s in states]
-        used = [{0, *(numbers[b.force] for b in s.branches)} for s in states]
+        self.further = [numbers[s.further] for s in states]
+        used = [{0, numbers[s.further], *(numbers[b.force] for b in s.branches)} for s in states]
         used = [u | {numbers[force] for _, force in s.closed} for u, s in zip(used, states, strict=True)]
         self.used = [sorted(u) for u in used]
         self.has_stiffness = stiffness
@@ -233,7 +250,7 @@ class Superposition:
         stick = step.contact[self.contact]
         cells = int(np.count_nonzero(stick))
         punch = None
-        if self.has_stiffness and number in self.latest:
+        if self.has_stiffness and number in self.further:
             last, this = self.last_pressure, step.solution.pressure
             punch = press_punch(step, None if last is None else np.maximum(last - this, 0.0))
         self.last_pressure = step.solution.pressure
@@ -278,7 +295,7 @@ class Superposition:
                 "tangential_displacement": mu * ratio * displacement,  # (2)
                 "stick_area": latest["stick_cells"] * cell,
                 "slip_area": latest["slip_cells"] * cell,
-                "tangential_stiffness": latest["stiffness"] / ratio,
+                "tangential_stiffness": self.rows[self.further[row]]["stiffness"] / ratio,
                 "dissipated_energy": mu * mu * ratio * dissipated * cell,
                 "residual": max(solution["residual"] for solution in used),
                 "converged": all(solution["converged"] for solution in used),

@@ -213,6 +213,15 @@ def test_closed_inner_loops_are_forgotten():
     assert float(loops["dissipated_energy"][-1]) > float(straight["dissipated_energy"][-1])
 
 
+def test_stiffness_at_the_end_of_a_loop_is_that_of_a_further_step():
+    """Up to there the stick set is that of the loop; beyond, the path goes on as without it."""
+    result = sheared(rough(), [0.3, 0.1, 0.3, 0.1 + 0.2, 0.3 + 1e-5, -0.3, 0.3], keep=(), tolerance=1e-10)
+    stiffness, stuck = result["tangential_stiffness"].values, result["stick_area"].values
+    np.testing.assert_allclose(stiffness[[2, 3, 4, 6]], stiffness[0], rtol=1e-3)
+    assert stiffness[1] > 1.01 * stiffness[0]
+    assert stuck[1] == stuck[2] > stuck[0]
+
+
 def test_cycles_repeat():
     result = sheared(rough(), [0.3, -0.3] * 4, keep=("traction_x",))
     energy = np.diff(result["dissipated_energy"].values)
