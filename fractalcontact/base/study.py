@@ -77,3 +77,14 @@ def scene_of(data: Any) -> dict[str, Any]:
     parameters = provenance_of(data).get("parameters")
     scene = parameters.get("scene") if isinstance(parameters, dict) else None
     return scene if isinstance(scene, dict) else {}
+
+
+def end_of_first_leg(test: Any) -> float | None:
+    """Return where a direct shear test first reverses, or ends (m); None where its path is not known."""
+    path = provenance_of(test).get("parameters", {}).get("path", [])
+    end = None
+    for place in path if isinstance(path, list) else [path]:
+        if end is not None and (place > end) != (end > 0):
+            break
+        end = place
+    return end

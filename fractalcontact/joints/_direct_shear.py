@@ -122,7 +122,8 @@ def direct_shear(
     crack : Crack
         Its faces without missing heights, and its basic_friction_angle.
     path : float or sequence of float
-        Positions (m, whole cells) at which the block reverses or stops, after 0: 3e-3, or [3e-3, -3e-3, 0].
+        Positions (m, whole cells) at which the block reverses, and at which it ends, after 0: 3e-3, or
+        [3e-3, -3e-3, 0]. Those on the way change nothing.
     nominal_pressure : float or sequence of float
         Normal stresses at the start, Pa; each on a fresh joint.
     hardness : float
@@ -228,8 +229,10 @@ def _cell_step(crack: Crack, towards: Direction, most: int = 8) -> float | None:
 
 
 def _legs(turning_points: Array, step: float) -> list[Array]:
-    """Return the positions of every leg, cell by cell, with both its ends."""
+    """Return the positions of every leg, cell by cell, with both its ends; a stop on the way ends none."""
     cells = np.rint(turning_points / step).astype(np.int64)
+    senses = np.sign(np.diff(cells))
+    cells = cells[np.concatenate([[True], senses[1:] != senses[:-1], [True]])]
     return [step * np.arange(a, b + np.sign(b - a), np.sign(b - a)) for a, b in itertools.pairwise(cells)]
 
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import spread_indices
-from fractalcontact.base.study import provenance_of
+from fractalcontact.base.study import end_of_first_leg
 from fractalcontact.base.units import quantity_text
 from fractalcontact.plotting import _paths, _style
 from fractalcontact.plotting._figure import Drawing, StudyFigure, figure
@@ -75,8 +75,8 @@ def strength_envelope(
         panel.key("out of range", **_style.DOTTED)
     if tests is not None:
         tested = result_of(tests, (*TESTS, dims[1]), dims[1:], argument="tests")
-        ends = np.ravel(provenance_of(tested).get("parameters", {}).get("path", []))
-        place = f" ({quantity_text(ends[0], 'm')})" if ends.size else ""  # of the first leg
+        end = end_of_first_leg(tested)
+        place = "" if end is None else f" ({quantity_text(end, 'm')})"
         for name, (kind, marker) in TESTS.items():
             style = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
             label = f"direct shear, {kind}{place if kind == AT_END else ''}"

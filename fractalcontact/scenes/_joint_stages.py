@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.study import MEMBER, provenance_of
+from fractalcontact.base.study import MEMBER, end_of_first_leg
 from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
 from fractalcontact.scenes._result_tables import Column, amount, are_one, at_value, finite, length, plain
 from fractalcontact.scenes._scene import LOADS
@@ -125,9 +125,8 @@ def _peak_distance(state: xr.Dataset) -> str | None:
 
 
 def _end_of_first_leg(test: xr.Dataset) -> str | None:
-    """Return the shear at which a test first reverses or stops."""
-    ends = np.ravel(provenance_of(test).get("parameters", {}).get("path", []))
-    return length(ends[0]) if ends.size else None
+    end = end_of_first_leg(test)
+    return None if end is None else length(end)
 
 
 def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:

@@ -6,6 +6,7 @@ import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import SmallStrainWarning
+from fractalcontact.base.study import end_of_first_leg
 
 FRICTION = 30.0
 MU = np.tan(np.radians(FRICTION))
@@ -146,6 +147,13 @@ def test_cycle_reverses_the_stress_and_wears_the_peak(rough_crack):
     first = stress[2:6].max()
     second = stress[-4:].max()
     assert 0 < second < first
+
+
+def test_a_stop_on_the_way_changes_nothing(rough_crack):
+    straight = sheared(rough_crack, [4e-4, 0.0], [2e6, 2e7])
+    stopped = sheared(rough_crack, [1e-4, 4e-4, 3e-4, 0.0], [2e6, 2e7])
+    xr.testing.assert_identical(*(test.drop_attrs().drop_vars("run_time") for test in (stopped, straight)))
+    assert end_of_first_leg(stopped) == end_of_first_leg(straight) == 4e-4
 
 
 @pytest.mark.parametrize("hardness", [1e24, 1e30])
