@@ -292,7 +292,7 @@ def _hertz(
     summit = None if any(grid.periodic) else _paraboloid(heights, grid)
     if summit is None:
         return none, none
-    least, most, reach = summit
+    least, most, axis, reach = summit
 
     def ratio_excess(m: float) -> float:
         return float((special.ellipe(m) / (1 - m) - special.ellipk(m)) / difference(m) - most / least)
@@ -306,7 +306,9 @@ def _hertz(
         m = float(optimize.brentq(ratio_excess, least_m, 1 - 1e-12, xtol=1e-14))
     area = grid.nominal_area
     semi_axis = np.cbrt(1.5 * pressure * area * difference(m) / (math.pi * least * m))
-    inside = semi_axis <= reach
+    # half the extent of the ellipse along x and y
+    extent = np.sqrt(axis**2 + (1 - m) * (1 - axis**2)) * semi_axis[:, None]
+    inside = (extent <= reach).all(axis=1)
     fraction = math.pi * semi_axis**2 * math.sqrt(1 - m) / area
     stiffness = math.pi * semi_axis / special.ellipk(m) / area
     return np.where(inside, fraction, math.nan), np.where(inside, stiffness, math.nan)
@@ -320,8 +322,11 @@ def _paraboloid(
     # curvature along the summit over that across it: the fit of a cylinder leaves 1e-16 of it, and the ratio
     # of the axes, found between 0 and 1 - 1e-12, holds up to 7e10
     cylinder: float = 1e-9,
-) -> tuple[float, float, float] | None:
-    """Return A, B (m-1) and the distance (m) of the summit from the edge; None where it is no paraboloid."""
+) -> tuple[float, float, Array, Array] | None:
+    """Return A, B (m-1), the axis of A (x, y), and the distances (m) of the summit from the edges.
+
+    They are those to the nearer edge along x and y. None where the surface is no paraboloid.
+    """
     (ny, nx), (dy, dx) = grid.shape, grid.spacing
     half = 0.5 * max((ny - 1) * dy, (nx - 1) * dx)
     y, x = np.meshgrid(
@@ -335,13 +340,13 @@ def _paraboloid(
         return None
     _, slope_x, slope_y, xx, xy, yy = coefficients
     curvature = -np.array([[xx, 0.5 * xy], [0.5 * xy, yy]])
-    least, most = np.linalg.eigvalsh(curvature)
+    (least, most), axes = np.linalg.eigh(curvature)
     if least <= cylinder * most:
         return None
     summit = 0.5 * np.linalg.solve(curvature, [slope_x, slope_y])
-    reach = float(min(x.max() - abs(summit[0]), y.max() - abs(summit[1]))) * half
+    reach = (np.array([x.max(), y.max()]) - np.abs(summit)) * half
     factor = scale / half**2
-    return (float(least) * factor, float(most) * factor, reach) if reach > 0 else None
+    return (float(least) * factor, float(most) * factor, axes[:, 0], reach) if reach.min() > 0 else None
 
 
 def _small(fraction: Array) -> Array:

@@ -254,6 +254,21 @@ def test_hertz_holds_on_single_summits_only(surface):
     assert "one smooth summit" in found["contact_fraction"].attrs["reason"]
 
 
+def test_hertz_on_a_long_summit_ends_where_the_ellipse_reaches_the_edge():
+    """As the solver has it: an ellipse along the longer side may be longer than the shorter side."""
+    x, y = 1e-4 * np.arange(-80, 81), 1e-4 * np.arange(-20, 21)
+    long = -(0.5 * x[None, :] ** 2 + 20.0 * y[:, None] ** 2)
+    pressure = np.array([40.0, 200.0, 800.0]) / (long.size * 1e-8)
+    surface = fc.surfaces.from_array(long, 1e-4)
+    pressed = fc.contact.press(surface, contact_modulus=MODULUS, nominal_pressure=pressure)
+    edges = pressed["state"].isel(x=[0, -1]).any(("y", "x"))
+    np.testing.assert_array_equal(edges, [False, False, True])
+    for heights in (long, long.T):
+        found = hertz(fc.surfaces.from_array(heights, 1e-4), pressure)["contact_fraction"]
+        np.testing.assert_allclose(found[:2], pressed["corrected_contact_fraction"][:2], rtol=0.02)
+        assert np.isnan(found[2])
+
+
 def test_hertz_ends_where_the_contact_reaches_the_edge():
     found = hertz(summit(10.0, 10.0), [1e4, 1e9])["contact_fraction"].values
     assert np.isfinite(found).tolist() == [True, False]
