@@ -367,6 +367,8 @@ def stiffness(pressure: Array, closure: Array, rounding: float) -> Array:
 
     It is NaN too along a branch whose closure varies by no more than `rounding`.
     """
+    changes = np.concatenate([[True], np.diff(pressure) != 0])  # where the load pauses one step is enough
+    place, (pressure, closure) = np.cumsum(changes) - 1, (pressure[changes], closure[changes])
     values = np.full(pressure.size, math.nan)
     for branch in branches(pressure):
         steps = branch[(pressure[branch] > 0) & np.isfinite(closure[branch])]
@@ -376,7 +378,7 @@ def stiffness(pressure: Array, closure: Array, rounding: float) -> Array:
             slope = log_slopes(np.log(pressure[steps]), closure[steps])
             on_branch = np.where((slope > 0) & np.isfinite(slope), pressure[steps] / slope, math.nan)
         values[steps] = np.where(np.isnan(values[steps]), on_branch, values[steps])
-    return values
+    return np.asarray(values[place])
 
 
 def log_slopes(log_pressure: Array, closure: Array) -> Array:

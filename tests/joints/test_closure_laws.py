@@ -61,6 +61,14 @@ def test_fit_to_first_loading_and_stiffness_per_branch():
     assert "no force" in result.stiffness.attrs["reason"]
 
 
+def test_stiffness_of_a_path_that_pauses():
+    p, number = np.geomspace(1e5, 3e7, 8), [0, 1, 2, 2, 2, 3, 4, 5, 6, 7, 7, 6, 5, 4]
+    w = hyperbola(p, 2e10, 1e-4)
+    straight = fc.joints.closure_laws(law(p, w)).stiffness.values
+    paused = fc.joints.closure_laws(law(p[number], w[number])).stiffness.values
+    np.testing.assert_array_equal(paused[:11], straight[number[:11]])
+
+
 STUDY_LOADS = np.array([100, 200, 500, 1e3, 2e3, 3.5e3, 5e3, 7e3, 1e4, 1.4e4, 2e4, 3e4]) / 4e-4  # Pa
 
 
