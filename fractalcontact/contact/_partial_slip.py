@@ -41,7 +41,7 @@ def _check(problems: Problems) -> tuple[ContactProblem, solver.ShearPath] | None
     title="Partial slip of a rough contact",
     references="Ciavarella (1998), J. Appl. Mech. 65:998; Jaeger (1998), J. Appl. Mech. 65:1019",
     check=_check,
-    memory=320.0,  # of a free body with both directions; a periodic one takes 176
+    memory=320.0,  # of a free body, a fourth in contact; a periodic one takes 176. See `solver.FULL_BYTES`
 )
 @takes_checked
 def partial_slip(

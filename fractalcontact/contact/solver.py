@@ -24,6 +24,7 @@ import numpy as np
 from fractalcontact.base.errors import AnisotropyWarning, SmallStrainWarning, warn
 from fractalcontact.base.grid import EXCESS_PER_EDGE, Grid, contact_edges
 from fractalcontact.base.numbers import Array, number_of_entries
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.schema import CONTACT, OPEN, SLIP_MAPS, STEEP, STOP_REASONS, YIELDED
 from fractalcontact.base.signals import track
 from fractalcontact.base.validation import Problems
@@ -44,6 +45,9 @@ from fractalcontact.contact._superposition import (
 from fractalcontact.contact._superposition import METHODS as METHODS
 from fractalcontact.contact._superposition import ShearPath as ShearPath
 
+# bytes of a node in contact, as measured, that the full method takes beside the superposition, and 8 for the
+# traction from which each step starts
+FULL_BYTES = 580.0
 PRESSURE_CLASSES = 50  # of a distribution, from 0 to the greatest pressure: enough for a curve of a plot
 
 
@@ -304,7 +308,10 @@ def _solve_fully(
     from fractalcontact.contact._tangential_operator import TangentialOperator
 
     shear, normal, contact = superposition.shear, superposition.normal, superposition.contact
-    shape = (len(shear.forces), *contact.shape)
+    shape, nodes = (len(shear.forces), *contact.shape), int(np.count_nonzero(contact))
+    require_memory(
+        "", (FULL_BYTES + 8.0 * len(shear.forces)) * nodes, f"method='full' on {nodes} nodes in contact"
+    )
     maps = {name: np.zeros(shape, np.int8 if name == "slip_state" else np.float64) for name in keep}
     if contact.any():
         operator = TangentialOperator(normal.path.body, contact, shear.poisson)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import xarray as xr
 import fractalcontact as fc
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
+from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.signals import track
@@ -51,12 +52,17 @@ def _check(problems: Problems) -> tuple[JointProblem, ShearPath] | None:
     return problem, path
 
 
+def _memory(plane: Plane, arguments: Mapping[str, Any]) -> float:
+    """Return the bytes of the block: a free body, delta-surface, and the flat block, all of it in contact."""
+    return (650.0 if arguments.get("method") == "full" and not plane.periodic else 360.0) * plane.cells
+
+
 @public_result(
     title="Partial slip of a joint",
     references=BORRI_BRUNETTO_1998,
     reasons=dict.fromkeys(STIFFNESSES, RIGID),
     check=_check,
-    memory=360.0,  # of a cell: both directions of a free body (320), delta-surface and flat block
+    memory=_memory,
 )
 @takes_checked
 def partial_slip(

@@ -173,7 +173,7 @@ class ShearedContact:
             return solve(self.heights, *problem, *path, keep=keep)
         except InvalidInput as error:
             lines = [f"{line} ({self.place})" for line in error.problems]
-            raise InvalidInput("", lines) from error
+            raise type(error)("", lines) from error
 
 
 class Spring(NamedTuple):

@@ -19,7 +19,7 @@ from slip_cases import (
 
 import fractalcontact as fc
 from fractalcontact.base import resources
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 from fractalcontact.contact import _tangential_operator
 from fractalcontact.contact._problem import Body
 
@@ -347,3 +347,19 @@ def test_tamaas(direction):
         np.testing.assert_allclose(result[f"traction_{axis}"][0], theirs, atol=0.01 * largest)
     stick = (np.hypot(traction[..., 0], traction[..., 1]) < 0.999 * FRICTION * traction[..., 2]).sum()
     assert stick == pytest.approx(int((result["slip_state"] == 1).sum()), rel=0.02)
+
+
+def test_memory_of_the_full_method_is_that_of_the_nodes_in_contact(monkeypatch):
+    """It is known only once the surface is pressed: 4 in 100 nodes take little, all of them do not fit."""
+    given = {
+        "contact_modulus": MODULUS,
+        "poisson": POISSON,
+        "friction_coefficient": FRICTION,
+        "method": "full",
+    }
+    surface = rough(256)
+    monkeypatch.setattr(resources, "free_memory", lambda: resources.Free(3.0e7, "limit of the test"))
+    light = fc.contact.partial_slip(surface, nominal_pressure=1e6, tangential_force=1e-2, **given)
+    assert 0.01 < light["contact_area"] / light["nominal_area"] < 0.1
+    with pytest.raises(TooLittleMemory, match=r"method='full' on \d+ nodes in contact: about"):
+        fc.contact.partial_slip(surface, nominal_pressure=1e8, tangential_force=1e-2, **given)
