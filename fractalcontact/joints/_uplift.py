@@ -416,7 +416,7 @@ def _opened(
 
 
 def _isolated(gap: Array, pressure: Array) -> float:
-    return float(((gap > 0) & np.isnan(pressure)).mean())
+    return float(((_flow_network.conducting(gap) > 0) & np.isnan(pressure)).mean())
 
 
 def _path_stresses(gap: xr.DataArray) -> Array:

@@ -121,3 +121,12 @@ def test_radius_of_a_drain_of_one_cell(make_face, stretch):
     strength = (distant - near) / (waves[1] - waves[0])
     radius = period / (2 * np.pi) * np.exp(waves[0] - near / strength)
     assert radius == pytest.approx(0.14 * np.hypot(dx, dy), rel=0.01)
+
+
+def test_narrow_cells_beside_water_are_contact_and_not_isolated(make_face):
+    gap = np.full((8, 16), 1e-4)
+    gap[2:4, 4:8] = 1e-8  # water runs around them
+    gap[5:8, 9:12], gap[6, 10] = 0.0, 1e-4  # one open cell without water
+    water = fc.joints.uplift(make_face(gap, 1.0), upstream_pressure=1e5)
+    assert water.isolated_fraction == 1 / gap.size
+    assert water.wet_fraction == 1 - (8 + 9) / gap.size
