@@ -376,11 +376,17 @@ class WornJoint:
         self.rows: list[dict[str, float]] = []  # what is reported of every position
         self.shear_stiffness, self.reason = math.inf, ""  # elastic, Pa/m; why the test ended before the path
 
+    def shift(self, position: float) -> tuple[int, int]:
+        """Return the cells (y, x) from the start to a position (m) whose rounding grows with the path."""
+        y, x = self.crack.layout.shift(position, self.towards.unit)
+        return round(y), round(x)
+
     def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
         """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
         layout, (lower, upper) = self.crack.layout, self.crack.faces()
-        shift = layout.shift(position, self.towards.unit)
-        heights = heights_under(lower - self.lower_wear, layout, shift) - (upper + self.upper_wear)
+        heights = heights_under(lower - self.lower_wear, layout, self.shift(position)) - (
+            upper + self.upper_wear
+        )
         problem = self.problem
         if elastic:
             problem = replace(problem, options=replace(problem.options, hardness=None))
@@ -404,9 +410,9 @@ class WornJoint:
     def wear(self, position: float, state: State) -> None:
         """Wear off what a press at a position wears off, half of it from each face."""
         layout = self.crack.layout
-        shift = layout.shift(position, self.towards.unit)
+        shift = self.shift(position)
         rows, columns = (
-            (layout.start[axis] + int(shift[axis]) + np.arange(layout.cells[axis])) % layout.face_cells[axis]
+            (layout.start[axis] + shift[axis] + np.arange(layout.cells[axis])) % layout.face_cells[axis]
             for axis in (0, 1)
         )
         self.lower_wear[np.ix_(rows, columns)] += 0.5 * state.wear

@@ -149,6 +149,14 @@ def test_cycle_reverses_the_stress_and_wears_the_peak(rough_crack):
     assert 0 < second < first
 
 
+def test_a_direction_that_is_rounded_stays_on_the_grid(make_face, rough):
+    """It is off whole cells by less than 1e-6 a step, which adds up along the path."""
+    crack = fc.joints.Crack(make_face(2e-5 * rough((40, 40), 5), 1e-4), young=3e10, poisson=0.2, block=8e-4)
+    angle, path = np.degrees(np.arctan(0.5)), 8 * np.hypot(1, 2) * 1e-4
+    exact, rounded = (sheared(crack, path, direction=azimuth) for azimuth in (angle, angle - 1e-5))
+    np.testing.assert_allclose(rounded.shear_stress, exact.shear_stress, rtol=1e-5)
+
+
 def test_a_stop_on_the_way_changes_nothing(rough_crack):
     straight = sheared(rough_crack, [4e-4, 0.0], [2e6, 2e7])
     stopped = sheared(rough_crack, [1e-4, 4e-4, 3e-4, 0.0], [2e6, 2e7])
