@@ -32,7 +32,7 @@ end one along the gradient (4 in 2352), took 3 % more transforms.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -376,11 +376,15 @@ def coulomb_path(
     cell, state = units.cell_area * units.length**2, None
     for row, tangential in enumerate(forces.tolist()):
         start, transforms = perf_counter(), operator.transforms
-        target = unit * (tangential / units.force)
-        guess = shifted_start(state, starts[max(row - 1, 0) : row + 1] / units.pressure, bound, unit, target)
-        state = solver.step(slip, target, guess)
-        dissipated += float(np.sum(state.q * state.slip))
-        slip = slip + state.slip
+        if state is not None and tangential == forces[row - 1]:  # a pause is no step
+            state = replace(state, iterations=0)
+        else:
+            target, near = unit * (tangential / units.force), starts[max(row - 1, 0) : row + 1]
+            state = solver.step(
+                slip, target, shifted_start(state, near / units.pressure, bound, unit, target)
+            )
+            dissipated += float(np.sum(state.q * state.slip))
+            slip = slip + state.slip
         all_stick = contact.all() and not state.slips.any()
         rigid = operator.body.periodic and all_stick
         stiffness = math.inf if rigid else solver.stiffness(state, unit) * units.force / units.height

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, lsq_linear
 from slip_cases import (
+    ALL,
     COMPLIANCE,
     CONTACT_RADIUS,
     FORCE,
@@ -220,6 +221,15 @@ def test_stiffness_at_the_end_of_a_loop_is_that_of_a_further_step():
     np.testing.assert_allclose(stiffness[[2, 3, 4, 6]], stiffness[0], rtol=1e-3)
     assert stiffness[1] > 1.01 * stiffness[0]
     assert stuck[1] == stuck[2] > stuck[0]
+
+
+@pytest.mark.parametrize("method", ["superposition", "full"])
+def test_a_pause_of_the_force_changes_nothing(method):
+    result = sheared(rough(), [0.3, 0.3, -0.2, -0.2, -0.2], method=method)
+    for name in ("tangential_displacement", "tangential_stiffness", "dissipated_energy", "stick_area", *ALL):
+        values = result[name].values
+        np.testing.assert_array_equal(values[[1, 3, 4]], values[[0, 2, 2]])
+    assert not result["iterations"].values[[1, 3, 4]].any()
 
 
 def test_cycles_repeat():
