@@ -12,9 +12,10 @@ The solver is imported when it is first called: a study of rigid faces loads nei
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -29,7 +30,7 @@ from fractalcontact.base.provenance import differing
 from fractalcontact.base.schema import CONTACT_MAPS
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import BORRI_BRUNETTO_1998, joined_references, provenance_of
-from fractalcontact.base.validation import Problems, word_tuple
+from fractalcontact.base.validation import Problems, require, word_tuple
 from fractalcontact.joints._crack import Crack, block_coords, check_elastic
 from fractalcontact.joints._delta_surface import delta_heights
 
@@ -264,19 +265,32 @@ def _press_balanced(
         interface_closure = press(force)["interface_closure"][0] if force > 0 else 0.0
         return float(force - initial - stiffness * (opening - interface_closure))
 
+    @cache  # the search asks again for its ends
+    def log_excess(log_force: float) -> float:
+        return excess(math.exp(log_force))
+
     if initial + stiffness * opening <= 0:  # the faces sink away from the spring
         return press(0.0, contact.problem.keep)
-    at_initial = excess(initial) if initial > 0 else -stiffness * opening
-    low, high = (initial, initial - at_initial) if at_initial < 0 else (0.0, initial)
-    if abs(at_initial) <= error * initial:
-        force = initial
-    elif low > 0:  # the closure is nearly linear in the logarithm of the force
-        ends = np.log(low), np.log(high)
-        log_force = brentq(lambda x: excess(np.exp(x)), *ends, xtol=error, maxiter=most)
-        force = np.exp(log_force)
-    else:
-        force = brentq(excess, low, high, xtol=error * high, maxiter=most)
-    return press(float(force), contact.problem.keep)
+    at_initial = excess(initial)
+    if abs(at_initial) <= error * (initial + stiffness * abs(opening)):
+        return press(initial, contact.problem.keep)
+    floor = math.log(initial) if initial > 0 and at_initial < 0 else -math.inf
+    top = math.log(initial - min(at_initial, 0.0))
+    # from a force of the order that closes the opening: far beyond, the interface is lost in the block
+    area = contact.problem.crack.nominal_area
+    closing = contact.problem.modulus * math.sqrt(area) * abs(opening)
+    low = high = min(top, math.log(max(initial, closing)))
+    step = 7.0  # e^7 = 1e3
+    while high < top and log_excess(high) < 0:
+        low, high, step = high, min(high + step, top), 2 * step
+    while low > floor and log_excess(low) > 0:
+        low, high, step = max(low - step, floor), low, 2 * step
+    if low < high:
+        expected = f"a spring that the faces can balance ({contact.place})"
+        require(log_excess(high) >= 0, "normal_stiffness", expected, stiffness / area)
+        # the closure is nearly linear in the logarithm of the force
+        low = brentq(log_excess, low, high, xtol=error, maxiter=most)
+    return press(math.exp(low), contact.problem.keep)
 
 
 def _check_pressed(problems: Problems) -> None:

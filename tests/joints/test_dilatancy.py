@@ -321,6 +321,23 @@ def test_falling_plane_loses_its_force(make_face):
     np.testing.assert_allclose(result.normal_force.values[0, :, 0], exact, rtol=1e-6)
 
 
+@pytest.mark.parametrize("stiffness", [1e10, 1e20])
+def test_spring_without_a_first_force_is_one_with_a_small_one(stiffness):
+    face = fc.surfaces.fbm((60, 60), 1e-4, hurst=0.8, rms_increment=5e-6, rng=1)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=4e-3)
+    options = {"shear": [1e-4, 3e-4], "direction": "E", "normal_stiffness": stiffness}
+    none, small = (fc.joints.dilatancy(crack, normal_force=n, **options) for n in (0.0, 1e-6))
+    np.testing.assert_allclose(none["normal_force"], small["normal_force"], rtol=1e-6, atol=2e-6)
+
+
+def test_spring_beyond_the_faces_is_refused(spring_crack):
+    """The force that this spring would need bends the block by more than its digits leave of the faces."""
+    with pytest.raises(
+        ValueError, match=r"normal_stiffness: .* the faces can balance \(at a shear of 0.0003"
+    ):
+        fc.joints.dilatancy(spring_crack, shear=3e-4, direction="E", normal_force=1.0, normal_stiffness=1e30)
+
+
 def test_spring_needs_a_force(spring_crack):
     with pytest.raises(ValueError, match="normal_stiffness: expected nothing without a force"):
         fc.joints.dilatancy(spring_crack, shear=0.0, normal_stiffness=1.0)
