@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from fractalcontact.base.errors import MissingExtra
 from fractalcontact.base.numbers import Array
+from fractalcontact.base.resources import Plane
 from fractalcontact.joints._flow_network import Held, Network, dissipation, even_gradient
 
 ERROR = 1e-5  # of a result that is returned: elimination has 1e-7 at most, and a recursion loses a digit
@@ -17,9 +19,18 @@ UNKNOWN = (
     "NaN where the pressure comes out beyond those at the ends, or the flow beyond its bounds: the openings "
     "differ by more than the precision of the computer resolves"
 )
-# Bytes of memory at the peak, for each cell: 320 to 620 by multigrid at n = 800, as the allocator reuses its
-# pages or not. Elimination takes 760, 1430 and 1590 at n = 128, 256 and 512, up to .5 GB beside multigrid.
-FLOW_BYTES = 620.0
+DIRECT_CELLS = 300_000  # up to which elimination is faster than multigrid
+
+
+def flow_memory(plane: Plane, _: Mapping[str, Any]) -> float:
+    """Return the bytes of the flow through one plane at a time, of one or of more of them.
+
+    Measured for each cell: 1300, 1450 and 1590 by elimination at n = 128, 256 and 512, there 1830 where the
+    plane wraps, and 670 by multigrid at n = 600.
+    """
+    cells = math.prod(plane.shape)
+    by_elimination = cells <= DIRECT_CELLS or find_spec("pyamg") is None
+    return (1850.0 if by_elimination else 680.0) * cells + 8.0 * (plane.planes - 1) * cells
 
 
 def nested_dissection(shape: tuple[int, ...], wraps: tuple[bool, bool]) -> Array:
@@ -53,7 +64,7 @@ def pressures(
     held: Held,
     axis: int = 1,
     *,
-    largest_direct: int = 300_000,
+    largest_direct: int = DIRECT_CELLS,
 ) -> tuple[Array, float]:
     """Return the pressure in every cell, zero outside the chosen clusters, and its error.
 

@@ -22,7 +22,7 @@ from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints import _flow_network
 from fractalcontact.joints._criteria import HYDRAULIC_APERTURE, LARGEST_JRC, POSITIVE
 from fractalcontact.joints._flow_network import Network
-from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
+from fractalcontact.joints._network_pressure import ERROR, UNKNOWN, flow_memory, nested_dissection, pressures
 
 REFERENCES = (
     "Zimmerman, R. W. and Bodvarsson, G. S., Hydraulic conductivity of rock fractures, Transport in Porous "
@@ -54,7 +54,7 @@ def _check(problems: Problems) -> None:
     references=REFERENCES,
     reasons=dict.fromkeys(("transmissivity", "hydraulic_aperture", "flow_conductance"), UNKNOWN),
     check=_check,
-    memory=FLOW_BYTES,
+    memory=flow_memory,
 )
 def transmissivity(
     gap: xr.DataArray,

@@ -18,7 +18,7 @@ from fractalcontact.base.validation import Problems
 from fractalcontact.joints import _flow_network
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._flow_network import Held, Network
-from fractalcontact.joints._network_pressure import ERROR, FLOW_BYTES, UNKNOWN, nested_dissection, pressures
+from fractalcontact.joints._network_pressure import ERROR, UNKNOWN, flow_memory, nested_dissection, pressures
 
 EDGES = {"W": (1, False), "E": (1, True), "S": (0, False), "N": (0, True)}  # axis, is at its far end
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
@@ -122,7 +122,7 @@ def _check_path(problems: Problems, gap: xr.DataArray) -> None:
     ),
     reasons=dict.fromkeys(("uplift_arm", "uplift_x", "uplift_y"), NO_UPLIFT),
     check=_check,
-    memory=FLOW_BYTES,
+    memory=flow_memory,
 )
 def uplift(
     gap: xr.DataArray,

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import fractalcontact as fc
+from fractalcontact.base.resources import Plane, bytes_on
 from fractalcontact.joints import _network_pressure
 
 # relative amplitude, hydraulic over mean aperture across and along the crests
@@ -424,3 +425,12 @@ def test_unmeasured_apertures_are_told_what_to_do(make_face):
     gap[1, 2] = np.nan
     with pytest.raises(ValueError, match=r"gap\.fillna\(0\)"):
         flow(make_face, gap)
+
+
+@pytest.mark.parametrize(("cells", "planes", "least", "most"), [(256, 1, 1450, 1900), (600, 2, 650, 750)])
+def test_stated_memory_is_that_of_the_solver_in_use(cells, planes, least, most):
+    """As measured for each cell: elimination takes more than multigrid, which solves the large planes."""
+    pytest.importorskip("pyamg")
+    for function in (fc.joints.transmissivity, fc.joints.uplift):
+        stated = bytes_on(function.memory, Plane((cells, cells), planes=planes), {})
+        assert least <= stated / cells**2 <= most
