@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 from fractalcontact.base.errors import TooLittleMemory, UnreadableFile
 
 SMALL_FILE = 1 << 28  # bytes that any file may unpack to: about what the libraries take
-PLANES = ("surface", "crack", "mask", "gap", "heights")  # arguments that have a grid
+PLANES = ("surface", "crack", "mask", "gap", "heights", "lower", "upper")  # arguments that have a grid
 # arguments of several values, each of which gives a map
 PATHS = ("closure", "normal_force", "nominal_pressure", "tangential_force", "shear", "direction")
 SHARE = 32768  # elements worth a thread of their own: a transform takes 33 us, to hand it over 17 us

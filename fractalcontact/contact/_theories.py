@@ -61,6 +61,7 @@ def _check(problems: Problems) -> None:
     ),
     achieved_error="that of the theories, which assume an isotropic Gaussian surface",
     check=_check,
+    memory=130.0,
 )
 def theories(
     surface: xr.DataArray, *, contact_modulus: float, nominal_pressure: float | Sequence[float] | Array

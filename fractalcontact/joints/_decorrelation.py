@@ -59,6 +59,7 @@ def _check(problems: Problems) -> None:
     title="correlation of the faces of a sheared crack",
     references=f"{BORRI_BRUNETTO_1998}; Künsch, Ann. Stat. 17:1217 (1989) (jackknife)",
     check=_check,
+    memory=50.0,
 )
 def decorrelation_length(
     crack: Crack,

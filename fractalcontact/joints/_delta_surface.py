@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.grid import UNIFORM
 from fractalcontact.base.numbers import Array, float_array, is_within
 from fractalcontact.base.regression import fitted_slope, rounding_of
+from fractalcontact.base.resources import Plane
 from fractalcontact.base.results import public_result
 from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems, Words, require
@@ -35,7 +36,18 @@ from fractalcontact.joints._crack import FILL, Block, Crack, Pair, block_coords,
 DEGREE = 5  # of the spline; 3 and 7 change the heights of a fractal face by 2 and 1 % of their greatest
 
 
-@public_result(title="delta-surface of a sheared crack", references=BORRI_BRUNETTO_1998, check=check_sliding)
+def _memory(plane: Plane, arguments: Mapping[str, Any], working: float = 42.0) -> float:
+    """Return the bytes of all delta-surfaces, and of the work on one of them."""
+    count = np.size(arguments.get("shear", 0.0)) * np.size(arguments.get("direction", "E"))
+    return (working + 8.0 * count) * plane.cells
+
+
+@public_result(
+    title="delta-surface of a sheared crack",
+    references=BORRI_BRUNETTO_1998,
+    check=check_sliding,
+    memory=_memory,
+)
 def delta_surface(
     crack: Crack, shear: float | Sequence[float] | Array, direction: str | float | Sequence[str | float] = "E"
 ) -> xr.DataArray:
@@ -270,6 +282,7 @@ def _check_window(problems: Problems) -> None:
     achieved_error="not given: an interval of such a slope would have no stated coverage",
     reasons=dict.fromkeys(("variogram_dimension", "spectrum_dimension"), FLAT),
     check=_check_window,
+    memory=functools.partial(_memory, working=300.0),
 )
 def delta_dimension(
     crack: Crack,

@@ -24,7 +24,7 @@ from fractalcontact.joints._crack import FILL, Crack, check_crack
 from fractalcontact.joints._criteria import POSITIVE
 from fractalcontact.joints._delta_surface import heights_under
 from fractalcontact.joints._friction import PEAK_SHARE, secant_slopes
-from fractalcontact.joints._sheared_contact import JointProblem, ShearedContact, check_problem
+from fractalcontact.joints._sheared_contact import PRESS_BYTES, JointProblem, ShearedContact, check_problem
 
 WHERE = "fractalcontact.joints.direct_shear"
 FIRST = "NaN before the first step"
@@ -92,6 +92,7 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
         "shear_stiffness": "NaN where the faces have no compliance of their own",
     },
     check=_check,
+    memory=PRESS_BYTES + 48.0,  # and the wear of both faces for each of three normal stresses
 )
 @takes_checked
 def direct_shear(

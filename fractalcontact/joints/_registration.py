@@ -58,6 +58,7 @@ def _check(problems: Problems) -> None:
     title="two faces in mated position",
     references="Padfield, D., Masked object registration in the Fourier domain, IEEE TIP 21 (2012)",
     check=_check,
+    memory=930.0,
 )
 def register(
     lower: xr.DataArray,

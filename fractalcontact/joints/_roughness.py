@@ -61,6 +61,7 @@ def _check(problems: Problems) -> None:
         "roughness_coefficient_high": FEW_PROFILES,
     },
     check=_check,
+    memory=50.0,
 )
 def roughness_coefficient(
     surface: xr.DataArray,
@@ -251,6 +252,7 @@ def _line_numbers(shape: Sequence[int], cells: Sequence[int], spacing: Sequence[
 
 EVERY_5_DEGREES = tuple(5.0 * i for i in range(72))
 
+FACET_BYTES = 220.0  # of a cell: rises and area of four triangles, and what they are made from
 NO_FACET = "NaN where no facet faces the shear"
 FACET_REFERENCES = (
     "Grasselli, G., Wirth, J. and Egger, P., Quantitative three-dimensional description of a rough surface "
@@ -275,6 +277,7 @@ def _check_facets(problems: Problems) -> None:
     achieved_error="exact to rounding, but for shape and roughness_metric, which are a fit",
     reasons={"shape": NO_FACET},
     check=_check_facets,
+    memory=FACET_BYTES,
 )
 def directional_roughness(
     surface: xr.DataArray, *, direction: str | float | Sequence[str | float] = EVERY_5_DEGREES

@@ -14,7 +14,7 @@ from fractalcontact.base.numbers import Array, float_array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, require, word_tuple
 from fractalcontact.joints import _criteria
-from fractalcontact.joints._roughness import directional_roughness
+from fractalcontact.joints._roughness import FACET_BYTES, directional_roughness
 from fractalcontact.joints._roughness import roughness_coefficient as measured_coefficient
 
 MEASURED = ("roughness_coefficient", "asperity_angle")  # arguments that a surface replaces
@@ -67,6 +67,7 @@ def _use_asperities(criteria: Sequence[str]) -> bool:
     achieved_error="that of the criteria, which are empirical",
     reasons=dict.fromkeys(("shear_strength", "friction_angle"), NO_STRENGTH),
     check=_check,
+    memory=FACET_BYTES,
 )
 def strength_envelope(
     surface: xr.DataArray | None = None,
@@ -251,6 +252,7 @@ def _check_curve(problems: Problems) -> None:
     ),
     achieved_error="that of the criterion, which is empirical",
     check=_check_curve,
+    memory=50.0,
 )
 def shear_curve(
     surface: xr.DataArray | None,

@@ -110,6 +110,11 @@ calls = {
     "variogram": lambda: fc.dimensions.variogram(surface),
     "describe": lambda: fc.surfaces.describe(surface),
     "closure": lambda: fc.joints.closure(crack, shear=1e-3, normal_force=1.0),
+    "theories": lambda: fc.contact.theories(surface, contact_modulus=1e9, nominal_pressure=1e3),
+    "facets": lambda: fc.joints.directional_roughness(surface),
+    "register": lambda: fc.joints.register(surface, surface),
+    "direct_shear": lambda: fc.joints.direct_shear(crack, 1e-3, nominal_pressure=1e6, hardness=1e9),
+    "delta_dimension": lambda: fc.joints.delta_dimension(crack, shear=1e-3),
     "fbm": lambda: fc.surfaces.fbm((n, n), 1e-4, hurst=0.9, rms_increment=1e-6),
     "spectral": lambda: fc.surfaces.spectral((20000, 20000), 1e-4, hurst=0.7, rms_slope=0.1),
     "midpoint": lambda: fc.surfaces.midpoint((20001, 20001), 1e-4, hurst=0.7, rms_increment=1e-6),
@@ -132,7 +137,7 @@ def test_calls_beyond_the_limit_of_the_process_are_refused_before_they_start():
     answers = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     peak = int(answers.pop("peak"))
     assert set(answers.values()) == {"refused"}, (done.stdout, done.stderr)
-    assert len(answers) == 9
+    assert len(answers) == 14
     assert peak < 650  # MiB: libraries, and two arrays of 72 MB with a work array
 
 
