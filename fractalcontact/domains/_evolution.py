@@ -137,7 +137,7 @@ def _changes(planes: Planes, components: Sequence[Components], path: Path, spots
     for k in np.flatnonzero(path.before >= 0):
         rows[k] = _change(planes, components, path, int(k))
     with np.errstate(invalid="ignore"):
-        too_far = path.travel > np.fmax(spots, spots[path.before])
+        too_far = np.abs(path.travel) > np.fmax(spots, spots[path.before])
     rows[too_far, : len(EVENTS)] = np.nan
     comments = dict.fromkeys(CHANGES, f"NaN at the first state along {path.dim}, which has none before it")
     reasons = dict.fromkeys(EVENTS, "the block travels further than a spot") if too_far.any() else {}

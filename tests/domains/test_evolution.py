@@ -229,6 +229,8 @@ def test_islands_are_not_followed_over_more_than_a_spot():
         np.testing.assert_array_equal(result[name], [np.nan, 0, np.nan])
         assert "further than a spot" in result[name].attrs["comment"]
     assert np.isfinite(result.overlap[1:]).all()
+    back = fc.domains.evolution(mask.isel(shear=slice(None, None, -1)))
+    np.testing.assert_array_equal(back.births, [np.nan, np.nan, 0])
 
 
 def test_along_names_the_path():
