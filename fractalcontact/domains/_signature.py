@@ -149,20 +149,20 @@ def analyse(
     spots = RandomSpots.of_hits(hit[..., : len(SMALLEST)])
     hit = hit[..., len(SMALLEST) :]
     spot, gap = spots.size(grid), _gap(sides, hit)
+    # P of a point is the coverage; the gap is NaN there, as it is beyond half the extent
+    is_gap_below_cell = np.fmax(coverage, hit[:, 0, 0]) >= 0.5
 
     islands = np.array([plane.count for plane in components], np.int64)
     median = np.array([np.median(plane.sizes) if plane.count else np.nan for plane in components])
     start = np.zeros(planes.count)
     if window is None:
         start = spot[:, 0]
-        # the gap is the side at which P = 1/2, and P of a cell is the coverage
-        usable = (coverage < 0.5) & (islands >= FEWEST_ISLANDS)
+        usable = ~is_gap_below_cell & (islands >= FEWEST_ISLANDS)
         window = common_window(spot[usable, 0], gap[usable, 0], shortest, extent)
     low, high = float_array(window)
     scales = np.geomspace(low, high, 3) if low < high else FINEST * shortest * np.array([1.0, 2.0, 4.0])
-    flags, reasons = _flags(
-        planes, gap[:, 0], islands, median, np.fmax(low, start), has_window=bool(np.isfinite(low))
-    )
+    own_gap, start = np.where(is_gap_below_cell, 0.0, gap[:, 0]), np.fmax(low, start)
+    flags, reasons = _flags(planes, own_gap, islands, median, start, has_window=bool(np.isfinite(low)))
     in_window, plain = _window_quantities(planes, spots, np.array([low, high]), scales)
     pairs = planes.map(lambda *plane: pair_correlation_length(planes, plane[-1]), range(planes.count))
     quantities = {"spot_size": spot, "gap_size": gap, "pair_correlation_length": np.array(pairs)}
@@ -370,7 +370,7 @@ def _gap(lengths: Array, hit: Array) -> Array:
 def _flags(
     planes: Planes, gap: Array, islands: Array, median: Array, start: Array, *, has_window: bool
 ) -> tuple[Array, Array]:
-    """Return the flag of each state, out of `FLAGS`, and the reason in words."""
+    """Return the flag of each state, out of `FLAGS`, and the reason in words; a gap below a cell is 0."""
     fewest_cells = 10  # below, clustering grows with the grid (2.6 to 9.4, 256 to 2048)
     coverage, count = planes.coverage, planes.count
     tests: list[tuple[Array, list[str]]] = [
@@ -378,9 +378,10 @@ def _flags(
         (coverage == 1, ["the set is full"] * count),
         (np.full(count, not has_window), ["the mask is too small for a window of ratio 4"] * count),
         (
-            (coverage >= 0.5) | (gap < 2.0 * start),
+            gap < 2.0 * start,
             [
-                f"the gap, {g:.3g}, is less than twice the start of a window, {s:.3g}"
+                f"the gap, {f'{g:.3g}' if g else 'below a cell'}, is less than twice the start of a window, "
+                f"{s:.3g}"
                 for g, s in zip(gap, start, strict=True)
             ],
         ),

@@ -193,6 +193,18 @@ def test_flags_say_why_there_is_no_dimension():
     assert float(result.window_high) <= 256 / 4
 
 
+def test_gap_below_a_cell_is_filled():
+    """Bars of 2 x 13 cells in a raster of 5 x 14: a square of one cell meets them at .6 of its positions."""
+    cells = np.zeros((280, 280), bool)
+    for row, column in np.ndindex(20, 56):
+        cells[14 * row : 14 * row + 13, 5 * column : 5 * column + 2] = True
+    for bars in (cells, ~cells):
+        result = signature(bars)
+        assert np.isnan(result.gap_size)
+        assert FLAGS[int(result.signature_flag)] == "filled"
+        assert "the gap, below a cell, is less" in str(result.reason.values)
+
+
 def test_a_state_alone_sets_no_saturated_window():
     """The window ends before half of the squares are met, or has the least ratio."""
     for coverage in (0.02, 0.1, 0.3):
