@@ -55,6 +55,11 @@ class Grid:
         return tuple(n * s for n, s in zip(self.shape, self.spacing, strict=True))
 
     @property
+    def length_unit(self) -> str:
+        """Unit of lengths."""
+        return "m" if self.has_coordinates else "cells"
+
+    @property
     def cell_area(self) -> float:
         """Area of one cell in m2."""
         return float(np.prod(self.spacing))

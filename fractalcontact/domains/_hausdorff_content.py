@@ -37,12 +37,13 @@ def _check(problems: Problems) -> None:
     problems.integer("shifts", at_least=1)
     is_length = problems.number("coarsest", above=0.0, at_most=10.0**DECADES, optional=True)
     if _masks.check_mask(problems):
-        dy, dx = _masks.mask_grid(given.mask).spacing
+        grid = _masks.mask_grid(given.mask)
+        dy, dx = grid.spacing
         is_square = abs(dy - dx) <= UNIFORM * dx
         problems.require(is_square, "mask", "square cells", f"spacings {dy:g} and {dx:g} m")
         finest = min(dy, dx)
         if is_length and given.coarsest is not None:
-            expected = f"at least the spacing, {finest:g} m"
+            expected = f"at least the spacing, {finest:g} {grid.length_unit}"
             problems.require(given.coarsest * ROUNDED >= finest, "coarsest", expected)
 
 
@@ -53,10 +54,8 @@ def _check(problems: Problems) -> None:
     check=_check,
     quantities={
         "exponent": Quantity("1", "exponent s of the content"),
-        "hausdorff_content": Quantity(
-            None, "Hausdorff content in m^s, by dyadic squares; mean over the shifts"
-        ),
-        "hausdorff_content_min": Quantity(None, "Hausdorff content in m^s, least over the shifts"),
+        "hausdorff_content": Quantity(None, "Hausdorff content by dyadic squares, mean over the shifts"),
+        "hausdorff_content_min": Quantity(None, "Hausdorff content, least over the shifts"),
         "relative_content": Quantity("1", "Hausdorff content over that power of the side of the extent"),
         "coarsest_side": Quantity("m", "side of the largest square of the cover"),
     },
@@ -133,7 +132,9 @@ def hausdorff_content(
         "relative_content": planes.variable(mean / extent**exponents, "exponent"),
         "coarsest_side": ((), spacing * 2.0**levels),
     }
-    dataset = planes.dataset(variables, {"exponent": ("exponent", exponents)})
+    comment = {"comment": f"in {planes.grid.length_unit}^s"}
+    notes = dict.fromkeys(("hausdorff_content", "hausdorff_content_min"), comment)
+    dataset = planes.dataset(variables, {"exponent": ("exponent", exponents)}, notes=notes)
     return dataset if np.ndim(s) else dataset.isel(exponent=0)
 
 

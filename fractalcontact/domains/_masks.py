@@ -402,7 +402,8 @@ def check_window(problems: Problems, *, has_mask: bool) -> None:
     if problems.require(is_pair, "window", "two lengths, (low, high)") and has_mask:
         grid = mask_grid(problems.given.mask)
         longest = min(grid.extent) / 2.0
-        expected = f"from a cell, {max(grid.spacing):g} m, to half the extent, {longest:g} m"
+        ends = f"{max(grid.spacing):g} to {longest:g} {grid.length_unit}"
+        expected = f"from a cell to half the extent, {ends}"
         problems.require(bool(is_within(values, max(grid.spacing), longest).all()), "window", expected)
 
 

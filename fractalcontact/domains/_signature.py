@@ -188,7 +188,7 @@ def analyse(
     if planes.dims:
         variables |= _changes(planes, quantities, along or planes.dims[-1])
     coords = {"side": ("side", sides), "scale": ("scale", scales)}
-    return planes.dataset(variables, coords, notes=_notes(low, high))
+    return planes.dataset(variables, coords, notes=_notes(low, high, grid.length_unit))
 
 
 def common_window(spots: Array, gaps: Array, shortest: float, extent: float) -> tuple[float, float]:
@@ -372,7 +372,7 @@ def _flags(
 ) -> tuple[Array, Array]:
     """Return the flag of each state, out of `FLAGS`, and the reason in words; a gap below a cell is 0."""
     fewest_cells = 10  # below, clustering grows with the grid (2.6 to 9.4, 256 to 2048)
-    coverage, count = planes.coverage, planes.count
+    coverage, count, unit = planes.coverage, planes.count, planes.grid.length_unit
     tests: list[tuple[Array, list[str]]] = [
         (~(coverage > 0), ["the set is empty"] * count),
         (coverage == 1, ["the set is full"] * count),
@@ -380,8 +380,8 @@ def _flags(
         (
             gap < 2.0 * start,
             [
-                f"the gap, {f'{g:.3g}' if g else 'below a cell'}, is less than twice the start of a window, "
-                f"{s:.3g}"
+                f"the gap, {f'{g:.3g} {unit}' if g else 'below a cell'}, is less than twice the start of a "
+                f"window, {s:.3g} {unit}"
                 for g, s in zip(gap, start, strict=True)
             ],
         ),
@@ -450,8 +450,8 @@ def _changes(planes: Planes, quantities: dict[str, Array], along: str) -> dict[s
     return result
 
 
-def _notes(low: float, high: float) -> dict[str, dict[str, str]]:
-    window = f"over {low:.3g} to {high:.3g} m" if np.isfinite(low) else "without a window"
+def _notes(low: float, high: float, unit: str) -> dict[str, dict[str, str]]:
+    window = f"over {low:.3g} to {high:.3g} {unit}" if np.isfinite(low) else "without a window"
     return {
         "domain_dimension": {
             "long_name": f"box dimension of the domain {window}",

@@ -134,6 +134,8 @@ def test_stacks_chunks_and_unobserved_cells():
     masked = fc.domains.hausdorff_content(mask, 1.2, valid=valid).hausdorff_content
     np.testing.assert_array_equal(masked, fc.domains.hausdorff_content(mask & valid, 1.2).hausdorff_content)
     assert (result.hausdorff_content[0] == 0).all()
+    assert result.hausdorff_content.attrs["comment"] == "in m^s"
+    assert fc.domains.hausdorff_content(mask.values, 1.0).hausdorff_content.attrs["comment"] == "in cells^s"
 
 
 def test_all_wrong_arguments_are_listed():

@@ -285,6 +285,8 @@ def test_chunked_masks_and_plain_arrays_give_the_same_numbers():
         np.testing.assert_array_equal(other.gap_size_low, expected.gap_size_low)
     assert plain.gap_size.attrs["units"] == "1"
     assert expected.gap_size.attrs["units"] == "m"
+    assert plain.domain_dimension.attrs["long_name"].endswith(" cells")
+    assert expected.domain_dimension.attrs["long_name"].endswith(" m")
 
 
 @pytest.mark.parametrize("shape", [(3, 3), (1, 1), (1, 8), (5, 40)])
@@ -301,6 +303,8 @@ def test_window_is_checked():
     for window in ((4,), (8, 4), (4, 64), (0.5, 8), (np.nan, 8), "all"):
         with pytest.raises(InvalidInput, match="window"):
             fc.domains.signature(cells, window=window)
+    with pytest.raises(InvalidInput, match="from a cell to half the extent, 1 to 32 cells"):
+        fc.domains.signature(cells, window=(4, 64))
     coords = plane_coords((64, 64), (1e-3, 1e-3), (True, True))
     result = fc.domains.signature(xr.DataArray(cells, coords, ("y", "x")), window=(4e-3, 16e-3))
     assert (float(result.window_low), float(result.window_high)) == (4e-3, 16e-3)
