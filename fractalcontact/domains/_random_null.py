@@ -17,6 +17,7 @@ from functools import cache, reduce
 
 import numpy as np
 
+from fractalcontact.domains._aligned_boxes import joined_boxes
 from fractalcontact.domains._masks import Array, Planes
 
 LEAST_LOG = -700.0  # of a probability: float64 ends at exp(-745), and the product of two is 0
@@ -253,7 +254,10 @@ class NullBoxes:
             self.pairs = on_all_axes
         else:
             valid, observed = planes.valid[plane], int(planes.observed[plane])
-            contents = _contents_in_gaps(valid, planes.periodic, observed, sizes, longest)
+            if is_aligned:
+                contents = _aligned_contents_in_gaps(valid, planes.rank, observed, sizes)
+            else:
+                contents = _contents_in_gaps(valid, planes.periodic, observed, sizes, longest)
             in_gaps = PairsInGaps(valid, planes.rank, int(sizes.max(initial=1)))
             self.pairs = cache(in_gaps.aligned if is_aligned else in_gaps.any_place)
         self.contents = dict(zip(sizes.tolist(), contents, strict=True))
@@ -310,6 +314,17 @@ def _contents_in_gaps(
         total = float(max(counts[numbers].sum(), 1))
         cells = np.rint(numbers * (size / counted) ** rank).astype(np.int64)
         contents.append(BoxContents(cells, counts[numbers] / total, total / area, observed / area))
+    return contents
+
+
+def _aligned_contents_in_gaps(valid: Array, rank: int, observed: int, sizes: Array) -> list[BoxContents]:
+    """Return the contents of the boxes of each size on the grid that starts at the first cell."""
+    contents = []
+    for size, inside in zip(sizes.tolist(), joined_boxes(valid.astype(np.int64), sizes, np.add), strict=True):
+        counts = np.bincount(inside.ravel())
+        cells = np.flatnonzero(counts[1:]) + 1
+        boxes = float(max(counts[cells].sum(), 1))
+        contents.append(BoxContents(cells, counts[cells] / boxes, boxes, observed / float(size) ** rank))
     return contents
 
 

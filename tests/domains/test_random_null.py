@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from domains.sets import as_mask, level_set, random_null
 from scipy import ndimage
+from scipy.stats import hypergeom
 
 import fractalcontact as fc
 
@@ -24,6 +25,22 @@ def test_null_counts_match_exact_fractions(sets):
         missed = 1.0 - float(result.null_count[0]) * region / observed
         exact = float(Fraction(comb(observed - region, cells), comb(observed, cells)))
         assert missed == pytest.approx(exact, rel=1e-11, abs=1e-14)
+
+
+def test_aligned_null_counts_in_gaps_match_a_sum_over_boxes():
+    """Boxes of one grid that are cut by the edge, or hold gaps, are missed more often than full ones."""
+    rng = np.random.default_rng(14)
+    valid, sizes, cells = rng.random((33, 50)) < 0.7, [1, 4, 9, 16], 40
+    places = rng.choice(np.flatnonzero(valid), cells, replace=False)
+    mask = np.isin(np.arange(valid.size), places).reshape(valid.shape)
+    result = fc.domains.box_dimension(as_mask(mask), box_sizes=sizes, cover="aligned", valid=as_mask(valid))
+    observed = int(valid.sum())
+    for size, count in zip(sizes, result.null_count.values, strict=True):
+        starts = np.arange(0, 33, size), np.arange(0, 50, size)
+        held = np.add.reduceat(np.add.reduceat(valid.astype(int), starts[0], 0), starts[1], 1)
+        held = held[held > 0]
+        met = 1.0 - hypergeom(observed, cells, held).pmf(0)
+        assert count == pytest.approx(observed / size**2 * met.mean(), rel=1e-9)
 
 
 def test_null_counts_and_spread_match_realisations():
