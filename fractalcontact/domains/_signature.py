@@ -117,7 +117,8 @@ def signature(
     start of the window (filled), where it has fewer than 30 islands (too_few), where the median island has
     fewer than 10 cells (unresolved), or where no window fits into the mask. P(s) is that of squares at any
     place, exact for the union of the cells. Intervals hold for one surface: other realisations may differ
-    more in coverage, which the load fixes. See the documentation, "Theory: contact domains".
+    more in coverage, which the load fixes. That of the pair correlation length needs 10 islands. See the
+    documentation, "Theory: contact domains".
 
     Examples
     --------
@@ -167,6 +168,9 @@ def analyse(
     pairs = planes.map(lambda *plane: pair_correlation_length(planes, plane[-1]), range(planes.count))
     quantities = {"spot_size": spot, "gap_size": gap, "pair_correlation_length": np.array(pairs)}
     quantities |= in_window
+    # of 100 sets of 3, 5, 10 and 30 discs of random radii the intervals of the others hold the mean in .87 to
+    # all, those of this length in .49, .68, .83 and .95, on periodic planes in .55, .68, .91 and all
+    quantities["pair_correlation_length"][islands < 10, 1:] = np.nan
     _withhold(quantities, plain, flags)
 
     variables: dict[str, Any] = {

@@ -298,6 +298,19 @@ def test_tiny_masks_are_flagged(shape):
         assert str(result.reason.values)
 
 
+def test_pair_correlation_length_of_few_islands_has_no_interval():
+    """Three spots of different sizes are no sample of any: leaving out blocks moves the length too little."""
+    cells = np.zeros((3, 256, 256), bool)
+    for plane, count in zip(cells, (3, 9, 10), strict=True):
+        for k in range(count):
+            plane[20 + 24 * k % 216 : 25 + 24 * k % 216 + k, 20 + 70 * (k // 9) : 30 + 70 * (k // 9)] = True
+    result = signature(cells)
+    assert result.n_islands.values.tolist() == [3, 9, 10]
+    assert np.isfinite(result.pair_correlation_length).all()
+    assert np.isfinite(result.pair_correlation_length_high).values.tolist() == [False, False, True]
+    assert np.isfinite(result.spot_size_high).all()
+
+
 def test_window_is_checked():
     cells = np.zeros((64, 64), bool)
     for window in ((4,), (8, 4), (4, 64), (0.5, 8), (np.nan, 8), "all"):
