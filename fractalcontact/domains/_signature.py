@@ -341,7 +341,8 @@ def _curve_steps(shortest: float, extent: float, grid: Grid) -> Array:
     """Return the squares of the curves, from a cell to half the extent, in cells along y and x."""
     # with 300 in place of 24, 15 gaps at 256 cells moved by .4 % at most
     sides = np.geomspace(shortest, max(extent / 2.0, shortest), 24)
-    cells = np.rint(sides[:, None] / np.array(grid.spacing)).astype(np.int64)
+    # halves, as 1.5 cells of the shorter spacing, are rounded up in any unit of length
+    cells = np.rint(sides[:, None] / np.array(grid.spacing) * ROUNDED).astype(np.int64)
     return np.unique(np.clip(cells, 1, np.maximum(np.array(grid.shape) - 1, 1)), axis=0)
 
 

@@ -271,6 +271,9 @@ def test_results_do_not_depend_on_the_unit_of_length():
     metres, millimetres = (signature(cells, (unit, unit), window=(5 * unit, 20 * unit)) for unit in (1, 1e-3))
     assert float(metres.domain_dimension) == pytest.approx(float(millimetres.domain_dimension), abs=1e-12)
     assert float(metres.gap_size) == pytest.approx(1e3 * float(millimetres.gap_size), rel=1e-12)
+    # the first side is 1.5 cells along x
+    oblong = [signature(cells[:60, :96], (1.5 * unit, unit)) for unit in (1, 1e-3)]
+    np.testing.assert_allclose(oblong[0].side, 1e3 * oblong[1].side, rtol=1e-12)
 
 
 def test_chunked_masks_and_plain_arrays_give_the_same_numbers():
