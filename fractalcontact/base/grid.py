@@ -18,7 +18,7 @@ import xarray as xr
 
 from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.resources import has_blocks
-from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, Quantity
+from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, Quantity, in_cells, is_in_cells
 
 # largest distance of a centre from its place on a uniform axis, in spacings: a height is then off by 1e-6 of
 # its increment
@@ -306,7 +306,8 @@ def result_faults(data: Any, argument: str) -> Iterator[Fault]:
         if variable.dtype.kind not in kinds:
             yield f"{argument}.{name}", expected, f"type {variable.dtype}"
         units = variable.attrs.get("units", quantity.units)
-        if quantity.units is not None and not _is_unit_of(units, quantity):
+        is_counted = bool(in_cells(str(name))) and is_in_cells(variable.attrs)
+        if quantity.units is not None and not (is_counted or _is_unit_of(units, quantity)):
             yield f"{argument}.{name}.units", repr(quantity.units), units
         if not isinstance(variable.attrs.get("long_name", ""), str):
             yield f"{argument}.{name}.long_name", "words", variable.attrs["long_name"]

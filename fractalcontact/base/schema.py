@@ -555,6 +555,11 @@ def in_cells(name: str) -> dict[str, str]:
     return {"units": "1", "comment": "in cells"} if quantity and quantity.units in ("m", "m2") else {}
 
 
+def is_in_cells(attributes: Mapping[Any, Any]) -> bool:
+    """Return whether a variable with these attributes is counted in cells, as `in_cells` says."""
+    return attributes.get("units") == "1" and str(attributes.get("comment", "")).startswith("in cells")
+
+
 def label(data: T) -> T:
     """Return `data` with the labels of this table; of other attributes few are kept.
 

@@ -153,7 +153,11 @@ class Planes:
             for name in own:
                 dataset.variables[name].attrs.update(in_cells(str(name)))
         for name, attributes in (notes or {}).items():
-            dataset.variables[name].attrs.update(attributes)
+            present = dataset.variables[name].attrs
+            comments = [present.get("comment"), attributes.get("comment")]
+            present.update(attributes)
+            if any(comments):
+                present["comment"] = "; ".join(filter(None, comments))
         return dataset
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.schema import QUANTITIES
+from fractalcontact.base.schema import QUANTITIES, is_in_cells
 from fractalcontact.base.units import Scale, named_scale, number, scale_for
 from fractalcontact.base.validation import Problems
 
@@ -62,7 +62,7 @@ def units_of(data: xr.DataArray) -> str:
     quantity = QUANTITIES.get(str(data.name))
     if units is None:
         units = (quantity.units or "") if quantity else ""
-    return str(units)
+    return "cells" if is_in_cells(data.attrs) else str(units)
 
 
 def _are_units(value: Any) -> bool:

@@ -81,3 +81,27 @@ def test_the_number_between_two_areas_is_that_of_the_larger_island():
     areas, numbers = STEP_LOOKUP_MAP[line.get_drawstyle()](*line.get_data())
     is_level = np.diff(areas) < 0.0
     assert numbers[:-1][is_level].tolist() == numbers[1:][is_level].tolist() == [1]
+
+
+def test_masks_without_coordinates_are_drawn_in_cells():
+    cells = np.random.default_rng(2).random((3, 32, 32)) > np.array([0.95, 0.9, 2.0])[:, None, None]
+    mask = xr.DataArray(cells, dims=("step", "y", "x"))
+    result = fc.domains.islands(mask)
+    assert result.largest_island.attrs["comment"] == "in cells; NaN where the set is empty"
+    map_, areas = plotting.islands(result)
+    assert areas.get_xlabel() == "island area (cells)"
+    assert map_.get_xlabel() == "$x$ (cells)"
+    np.testing.assert_array_equal(
+        areas.lines[0].get_xdata(), np.sort(result.cells[result.island_step == 0])[::-1]
+    )
+    for figure, of_mask in (
+        (plotting.signature, fc.domains.signature),
+        (plotting.lacunarity, fc.domains.lacunarity),
+        (plotting.signature, fc.domains.box_counts),
+    ):
+        (ax,) = figure(of_mask(mask))
+        assert ax.get_xlabel() == "box size (cells)"
+    evolution = fc.domains.evolution(mask)
+    assert plotting.evolution(evolution)[0].get_xlabel() == "step"
+    assert plotting.path(evolution, "hausdorff_distance").get_ylabel().endswith("(cells)")
+    assert plotting.box_dimension(fc.domains.box_dimension(mask))[0].get_xlabel() == "coverage (%)"
