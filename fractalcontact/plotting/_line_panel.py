@@ -148,7 +148,9 @@ class LinePanel:
             self.ax.plot(*points, label=name, **({"marker": "o", "ls": ""} | style | fill))
 
     def band(self, name: str, x: Any, low: Any, high: Any, colour: Any, alpha: float = BAND_OPACITY) -> None:
-        """Fill between the ends of intervals."""
+        """Fill between the ends of intervals; an outline without a point would set the limits of the axes."""
+        if not np.isfinite(np.add(low, high)).any():
+            return
         ends = self.y.scale(low), self.y.scale(high)
         self.ax.fill_between(self.x.scale(x), *ends, color=colour, alpha=alpha, lw=0, label=name)
 

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
+import xarray as xr
 from plotting_figures import render
 
 from fractalcontact import plotting
@@ -60,6 +61,17 @@ def test_all_nan(study):
         data = study[path].to_dataset()
         floats = {name: v * np.nan for name, v in data.data_vars.items() if v.dtype.kind == "f"}
         render(drawing(data.assign(floats)))
+
+
+def test_interval_of_a_variable_without_values():
+    """Its band has no point: it sets no limits of a logarithmic axis."""
+    nothing = {
+        name: ("step", np.full(3, np.nan)) for name in ("spot_size", "spot_size_low", "spot_size_high")
+    }
+    result = label(xr.Dataset(nothing | {"normal_force": ("step", [1.0, 10.0, 100.0])}))
+    ax = plotting.path(result, "spot_size")
+    render(ax)
+    assert ax.get_xlim()[0] > 0
 
 
 def test_empty_domain():
