@@ -129,8 +129,9 @@ def _mark_sizes(panel: LinePanel, path: xr.Dataset, dim: str) -> None:
         name, own = "domain_dimension", panel.family.styles[0]
         if path.sizes[dim] == 1 and {f"{name}_low", f"{name}_high"} <= path.variables.keys():
             lowest, highest = (float(table(path, f"{name}_{end}", (dim,))[0]) for end in ENDS)
-            panel.band("dimension, interval", window, lowest, highest, own["color"], alpha=0.3)
-            panel.area_key("dimension, interval", facecolor=own["color"], alpha=0.3)
+            if np.isfinite([lowest, highest]).all():  # of a state that has a dimension
+                panel.band("dimension, interval", window, lowest, highest, own["color"], alpha=0.3)
+                panel.area_key("dimension, interval", facecolor=own["color"], alpha=0.3)
 
 
 @figure

@@ -198,6 +198,10 @@ def test_intervals_of_a_signature_are_drawn(measured):
     (ax,) = plotting.signature(data.isel(step=1).assign(ends))
     band = plotting.curves(ax).query("curve == 'dimension, interval'")
     assert [band[axis].agg(f).item() for axis in "xy" for f in ("min", "max")] == [0.5, 2.0, 0.9, 1.2]
+    for low, number in ((0.9, 1), (np.nan, 0)):  # the key of what is drawn, and of nothing else
+        (ax,) = plotting.signature(data.isel(step=1).assign(ends | {"domain_dimension_low": low}))
+        keys = [text.get_text() for legend in ax.artists for text in legend.get_texts()]
+        assert keys.count("dimension, interval") == number
 
 
 def test_windows_that_differ_between_states_are_not_shaded(measured):
