@@ -24,7 +24,7 @@ from fractalcontact.plotting._inputs import (
 from fractalcontact.plotting._line_panel import BAND_OPACITY, Family, LinePanel
 from fractalcontact.plotting._paths import PATH, StatePath
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
-from fractalcontact.plotting._units import Quantity, Units
+from fractalcontact.plotting._units import PLAIN, Quantity, Units
 
 SIZES = ("box_length", "radius_length", "side", "box_size", "radius")
 IN_CELLS = ("box_size", "radius")
@@ -147,7 +147,8 @@ def lacunarity(
     r"""Draw gliding-box lacunarity against box size, for increasing load and for increasing shear.
 
     Bands show the intervals, dashed lines the random null: randomly placed cells of equal coverage. At most
-    six curves are drawn; with `maps` all states are, as colours over load or shear and box size.
+    six curves are drawn; with `maps` all states are, as colours over load or shear (over the number of the
+    state on a path that turns back) and box size.
 
     Parameters
     ----------
@@ -177,6 +178,9 @@ def lacunarity(
             own = path.states.expand_dims([d for d in PATH if d != dim])
             along = _paths.loads_of(own, name, PATH if dim == PATH[1] else PATH[::-1])
             places = Quantity(along.values[0], along.scale, along.name)
+            steps = np.diff(places.values)
+            if not (np.all(steps > 0) or np.all(steps < 0)):  # cells of a path that turns back would overlap
+                places = Quantity(np.arange(1.0 + steps.size), PLAIN, "state, in the order of the path")
             colours = quantity(path.states, "lacunarity", (dim, "box_size"))
             _maps.draw_heat_map(ax, places, sizes_of(path.states, "box_size"), colours)
             ax.set_title(path.common)

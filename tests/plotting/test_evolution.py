@@ -226,6 +226,10 @@ def test_heat_maps_of_lacunarity_have_the_values_and_edges():
     assert by_shear.get_xlabel().startswith("shear displacement")
     render(by_load)
     render(plotting.lacunarity(result.isel(shear=0, step=1), maps=True))
+    unloaded = result.isel(shear=[0], step=[0, 1, 2, 1])
+    (ax,) = plotting.lacunarity(unloaded, maps=True)
+    assert ax.get_xlabel() == "state, in the order of the path"
+    np.testing.assert_array_equal(ax.collections[0].get_coordinates()[0, :, 0], np.arange(-0.5, 4))
 
 
 def test_a_study_draws_its_evolution(measured, tmp_path):
