@@ -65,7 +65,8 @@ def measure(
         A group for each part, over (method, setting): `error`, `run_time` (s, shortest of the calls),
         `first_run_time` (s, with compilation), `memory` (byte, peak of one call), `parameter`, and
         `on_pareto_front`: no setting of another method of the benchmark has a smaller error in a shorter
-        time. Over `method`: `benchmark`, `parameter_name`, `error_meaning` and `truth`.
+        time; where the parameter is the size of the input, none of the same size. Over
+        `method`: `benchmark`, `parameter_name`, `error_meaning` and `truth`.
 
     Raises
     ------
@@ -211,7 +212,10 @@ def _dataset(part: str, measured: Sequence[tuple[Benchmark, Method, list[Setting
 
 
 def pareto_front(compared: Sequence[Benchmark], columns: Mapping[str, Array]) -> Array:
-    """Return where no setting of another method of the benchmark has a smaller error in a shorter time."""
+    """Return where no setting of another method has a smaller error in a shorter time.
+
+    Of a benchmark with `equal_parameters` settings of the same parameter are compared.
+    """
     error, seconds, parameter = (columns[name] for name in ("error", "run_time", "parameter"))
     front = np.isfinite(error)
     for row, benchmark in enumerate(compared):

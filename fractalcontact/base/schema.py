@@ -503,7 +503,9 @@ QUANTITIES: dict[str, Quantity] = {
     "parameter_name": Quantity(None, "meaning of the parameter"),
     "error_meaning": Quantity(None, "meaning of the error"),
     "truth": Quantity(None, "what the error is measured against"),
-    "on_pareto_front": Quantity("1", "no setting of another method is better in both error and time"),
+    "on_pareto_front": Quantity(
+        "1", "no comparable setting of another method is better in both error and time"
+    ),
     "family": Quantity(None, "family of surfaces"),
     "size": Quantity("1", "points along an edge"),
     "bias": Quantity("1", "mean error of the Hurst exponent"),

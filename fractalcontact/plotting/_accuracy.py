@@ -41,7 +41,8 @@ def error_against_time(result: Any, *, units: Units | None = None, axes: Panels 
     """Draw true error against run time and peak memory, one row per benchmark and one curve per method.
 
     Each point is one setting of a method. A filled point is on the Pareto front: no setting of another method
-    of the benchmark has a smaller error in a shorter time.
+    of the benchmark has a smaller error in a shorter time; where the parameter is the size of the input, none
+    of the same size.
     """
     benchmarks = _benchmarks(result, units)
     shape = (len(benchmarks), 2)
