@@ -20,10 +20,11 @@ def brownian_bound(hurst: float, n: int, blur: float = 0.0, *, axes: int = 2, al
     """Return the bound for n points along each axis of fractional Brownian heights of unknown amplitude.
 
     Whittle's information gives sqrt(2 / var(d ln f / dH)) / n of a surface for large n: f is the spectral
-    density as sampled, with all its aliases, and the variance is over all wavevectors of the grid. At H near
-    1 a small surface does better by up to a fifth, because no exponent beyond 1 is allowed there. With a
-    Gaussian blur of the spread `blur`, in spacings, only the wavevectors count on which its squared transfer
-    function is above one half. Without `aliases` the density is the power law itself.
+    density as sampled, with all its aliases, and the variance is over all wavevectors of the grid. The
+    information of a small surface, from the covariance of all its heights, is larger: with 16, 32 and 64
+    points along an edge the exact bound is .63, .81 and .91 of this one at H = .9, and .89, .94 and .97 at
+    H = .5. With a Gaussian blur of the spread `blur`, in spacings, only the wavevectors count on which its
+    squared transfer function is above one half. Without `aliases` the density is the power law itself.
     """
     low, high = hurst - BOUND_STEP, hurst + BOUND_STEP
     w = (np.arange(BOUND_POINTS) + 0.5) / BOUND_POINTS * np.pi

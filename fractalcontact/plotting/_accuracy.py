@@ -103,9 +103,9 @@ def _methods(names: list[str]) -> Family:
 def estimator_errors(result: Any, *, axes: Panels | None = None) -> AxesArray:
     """Draw the rms error over the Cramer-Rao bound and the interval coverage against the true Hurst exponent.
 
-    There is one column per surface family and size, and one curve per method. An unbiased estimator has a
-    ratio of at least one. A calibrated 95 % interval has a coverage of 0.95; vertical bars show the
-    uncertainty due to the number of surfaces.
+    There is one column per surface family and size, and one curve per method. On large surfaces
+    an unbiased estimator has a ratio of at least one. A calibrated 95 % interval has a coverage of 0.95;
+    vertical bars show the uncertainty due to the number of surfaces.
     """
     data = result_of(result, tuple(QUANTITIES), ("method",))
     require_dims(data, {dim: dim for dim in CASES})

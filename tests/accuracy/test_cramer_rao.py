@@ -35,6 +35,22 @@ def test_bound_of_a_profile_is_that_of_its_increments(hurst):
     assert cramer_rao.brownian_bound(hurst, n, axes=1) == pytest.approx(information**-0.5, rel=0.05)
 
 
+@pytest.mark.parametrize(("hurst", "share"), [(0.5, 0.89), (0.9, 0.63)])
+def test_exact_bound_of_a_small_surface_is_less(hurst, share):
+    """Fisher information of heights above one of them, with their covariance and an unknown amplitude."""
+    n, step = 16, 1e-4
+    y, x = np.indices((n, n)).reshape(2, -1)
+    lag, first = np.hypot(np.subtract.outer(y, y), np.subtract.outer(x, x)), np.hypot(y, x)
+
+    def covariance(h):
+        return (np.add.outer(first ** (2 * h), first ** (2 * h)) - lag ** (2 * h))[1:, 1:]
+
+    change = (covariance(hurst + step) - covariance(hurst - step)) / (2 * step)
+    relative = np.linalg.solve(covariance(hurst), change)
+    information = 0.5 * (np.trace(relative @ relative) - np.trace(relative) ** 2 / len(change))
+    assert information**-0.5 == pytest.approx(share * cramer_rao.brownian_bound(hurst, n), rel=0.01)
+
+
 def test_aliased_density_matches_a_sum_over_many_more_images():
     hurst = 0.4
     w = (np.arange(cramer_rao.BOUND_POINTS) + 0.5) / cramer_rao.BOUND_POINTS * np.pi
