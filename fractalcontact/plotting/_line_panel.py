@@ -135,8 +135,10 @@ class LinePanel:
     def line(self, name: str, x: Any, y: Any, *, key: str = "", **style: Any) -> None:
         """Draw one curve."""
         x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
-        marker = "o" if x.size <= self.points else ""
-        self.ax.plot(self.x.scale(x), self.y.scale(y), label=name, **({"marker": marker} | style))
+        appearance = {"marker": "o" if x.size <= self.points else ""} | style
+        if not appearance["marker"]:
+            appearance |= _isolated_points(x, y)
+        self.ax.plot(self.x.scale(x), self.y.scale(y), label=name, **appearance)
         self.drawn.append((x, y))
         self.key(key, **style)
 
@@ -235,6 +237,13 @@ class LinePanel:
         own = self.family.legend()
         _style.side_legend(ax or self.ax, own, title=self.family.title)
         _style.side_legend(ax or self.ax, self.entries, title=title, low=bool(own))
+
+
+def _isolated_points(x: Array, y: Array) -> dict[str, Any]:
+    """Return the style that marks the points without a neighbour, through which no line goes."""
+    finite = np.pad(np.isfinite(x + y), 1)
+    places = np.flatnonzero(finite[1:-1] & ~finite[:-2] & ~finite[2:])
+    return {"marker": ".", "markevery": places.tolist()} if places.size else {}
 
 
 def _reaches_up_from_zero(values: Array) -> bool:

@@ -45,6 +45,20 @@ def test_mean_gap_beside_theories(pressed, theory):
     render(ax.figure)
 
 
+def test_point_without_a_neighbour_is_marked(pressed, theory):
+    """A theory that holds at one load alone has no line that shows it."""
+    first = np.arange(3) == 0
+    alone = theory.assign(mean_gap=theory["mean_gap"].where(xr.DataArray(first, dims="step")))
+    for result, marker in ((theory, ""), (alone, ".")):
+        (line,) = (
+            line
+            for line in plotting.path(pressed, "mean_gap", theory=result).lines
+            if line.get_label() == "Persson"
+        )
+        assert line.get_marker() == marker
+    assert line.get_markevery() == [0]
+
+
 def test_stiffness_in_the_unit_of_practice(pressed, theory):
     ax = plotting.path(pressed, "contact_stiffness", against="nominal_pressure", theory=theory)
     curves = values(ax)
