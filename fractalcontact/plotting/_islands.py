@@ -135,7 +135,7 @@ def evolution(
 ) -> AxesArray:
     """Draw the number of islands along a path, beside the islands that are born and those that are absorbed.
 
-    A dotted line marks the coalescence load: from there on more islands are absorbed than born.
+    A dotted line marks the coalescence: the first state in which more islands are absorbed than born.
 
     Parameters
     ----------
