@@ -312,6 +312,7 @@ def read_planes(
     if valid is not None:
         observed = _flags(valid).view(np.uint8).reshape(-1, *grid.shape)
         cells = cells * observed
+        observed = None if observed.all() else observed  # without gaps sums are exact that are not with them
     return Planes(
         cells,
         observed,

@@ -5,6 +5,7 @@ from math import comb
 
 import numpy as np
 import pytest
+import xarray as xr
 from domains.sets import as_mask, level_set, random_null
 from scipy import ndimage
 from scipy.stats import hypergeom
@@ -100,6 +101,15 @@ def test_null_spread_with_single_cells_missing_is_the_scatter_of_realisations(co
     masks, seen = as_mask(planes.reshape(-1, 60, 60), periodic=wraps), as_mask(valid, periodic=wraps)
     result = fc.domains.box_dimension(masks, cover=cover, valid=seen)
     assert float(result.null_spread[0]) == pytest.approx(result.box_dimension.values.std(ddof=1), rel=0.2)
+
+
+@pytest.mark.parametrize("cover", ["minimum", "mean", "aligned"])
+def test_observed_everywhere_is_without_gaps(cover):
+    mask = as_mask(random_null(50, 300, np.random.default_rng(34)), periodic=(False, True))
+    seen = fc.domains.box_dimension(mask, cover=cover, valid=xr.ones_like(mask, bool))
+    xr.testing.assert_equal(
+        seen.drop_vars("run_time"), fc.domains.box_dimension(mask, cover=cover).drop_vars("run_time")
+    )
 
 
 def test_null_spread_of_many_sizes_is_the_scatter_of_realisations():
