@@ -162,7 +162,7 @@ def draw_flags(ax: Axes, plane: xr.DataArray) -> None:
 
 
 def draw_labels(ax: Axes, plane: xr.DataArray, count: int = 12) -> None:
-    """Draw the labels of islands in so many colours, neighbouring islands in different ones."""
+    """Draw the labels of islands in so many colours, most neighbouring islands in different ones."""
     import matplotlib
 
     labels = np.asarray(plane.values).astype(np.int64)
