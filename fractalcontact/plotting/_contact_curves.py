@@ -179,6 +179,9 @@ def pressure_distribution(
         own, pressure = family.styles[i], x.values[i]
         density = share[i] * classes.size / greatest[i]
         panel.line(family.curve("this surface", i), pressure, density, drawstyle="steps-mid", lw=1.0, **own)
+        # such steps begin and end in the middle of a class: the outer halves of the first and the last
+        outer = panel.x.scale([[0.0, pressure[-1]], [pressure[0], greatest[i]]])
+        panel.ax.hlines(panel.y.scale(density[[0, -1]]), *outer, label="_half classes", lw=1.0, **own)
         if spread:
             beside = np.linspace(0.0, float(pressure[-1]), 400)  # below 1/72 inch each
             theirs = _persson(beside, nominal[i], spread)

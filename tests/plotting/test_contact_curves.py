@@ -83,6 +83,10 @@ def test_distribution_adds_up(pressed, theory):
     for i, (pressure, density) in enumerate(curves[::2]):
         width = pressure[1] - pressure[0]
         assert density.sum() * width == pytest.approx(float(pressed["contact_fraction"][i]))
+        first, last = ax.collections[i].get_segments()  # outer halves of the classes at both ends
+        np.testing.assert_allclose(first, [[0.0, density[0]], [pressure[0], density[0]]])
+        end = float(pressed["maximum_pressure"][i]) / 1e6
+        np.testing.assert_allclose(last, [[pressure[-1], density[-1]], [end, density[-1]]])
     nominal, spread = 40.0, float(theory["pressure_spread"]) / 1e6
     pressure, density = curves[-1]  # Persson: the area is erf(p/(sqrt(2) s))
     tail = 1 - math.erf((pressure[-1] + nominal) / (math.sqrt(2) * spread)) / 1
