@@ -71,11 +71,10 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
     cells = turning_points / step
     on_grid = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
     expected = f"multiples of {step:g} m, the cells along {towards.name}: wear stays on the grid"
-    if problems.require(on_grid, "path", expected, turning_points.tolist()):
+    given = turning_points[1:].tolist()  # the path begins at 0
+    if problems.require(on_grid, "path", expected, given):
         moves = bool((np.diff(np.rint(cells)) != 0).all())
-        problems.require(
-            moves, "path", "positions other than the one before, the first not 0", turning_points
-        )
+        problems.require(moves, "path", "positions other than the one before, the first not 0", given)
     y, x = towards.unit
     for reach, unit in ((turning_points.max(), (y, x)), (-turning_points.min(), (-y, -x))):
         travel = crack.layout.travel(unit)

@@ -240,6 +240,7 @@ def test_diagonal_path_stays_on_the_grid(rough_crack):
     ("change", "message"),
     [
         ({"path": 1.5e-4}, "multiples of 0.0001 m"),
+        ({"path": [1.5e-4, 0.0]}, r"got \[0.00015, 0.0\]$"),
         ({"path": 5e-3}, "edge of the face"),
         ({"path": [2e-4, 2e-4]}, "other than the one before"),
         ({"path": 0.0}, "other than the one before"),
