@@ -12,14 +12,21 @@ function of q, is interpolated.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from fractalcontact.dimensions._gaussian_mixture import ALIASED, FADED, FILTERED, UNALIASED, AxisBlur
+from fractalcontact.dimensions._gaussian_mixture import (
+    ALIASED,
+    FADED,
+    FILTERED,
+    LN_ALIAS,
+    UNALIASED,
+    AxisBlur,
+)
 from fractalcontact.dimensions._mode_bins import block_product
 from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, LONG_HURST, NOISE, SHARPNESS, SPREAD
 
@@ -95,16 +102,22 @@ class MetricSpectrum:
             along_y, along_x = (chebvander(q.ravel() / np.pi, _NODES - 1).T for q in (y * self.dy, x))
             along_y = self._far_images.T @ along_y
             total += block_product(along_y.T, along_x) if is_grid else (along_y * along_x).sum(axis=0)
+        if self.theta[CORNER] > 0.0:
+            own = replace(self, form=UNALIASED)._near_images(y, x)
+            aliases = (total - own) * self._bend(LN_ALIAS)
+            total = own * self._bend(0.5 * np.log(np.maximum(y * y + x * x, 1e-30))) + aliases
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):
                 total *= np.square(AxisBlur(q.ravel()).transfers(s)[1].reshape(q.shape))
         gammas = math.gamma(1.0 + hurst) / math.gamma(1.0 - hurst)
         total *= 2.0 ** (2.0 * hurst + 1.0) * np.pi * hurst * gammas / self.dy
-        if self.theta[CORNER] > 0.0:
-            sharpness = self.theta[SHARPNESS]
-            corner = sharpness * np.log(self.theta[CORNER] ** 2 / np.maximum(y * y + x * x, 1e-30))
-            total *= np.exp((self.theta[LONG_HURST] - hurst) / sharpness * np.logaddexp(0.0, corner))
         return np.asarray(np.maximum(total, 1e-300))
+
+    def _bend(self, lnq: Array | float) -> Array:
+        """Return the factor of the corner at the logarithm of a wavenumber."""
+        hurst, long_hurst, sharpness = self.theta[[HURST, LONG_HURST, SHARPNESS]]
+        bend = np.logaddexp(0.0, 2.0 * sharpness * (np.log(self.theta[CORNER]) - lnq))
+        return np.asarray(np.exp((long_hurst - hurst) / sharpness * bend))
 
     def _near_images(self, y: Array, x: Array) -> Array:
         """Return the sum of the nearest images."""
