@@ -125,9 +125,9 @@ def partial_slip(
     directions: within a few per cent on isotropic surfaces. Under a lay, displacement and dissipated energy
     are up to (2 - nu)/(2 - 2 nu) times the true ones across it, down to 1 - nu/2 times along it. Neither
     method has the change of the pressure between dissimilar bodies. A change of the force below `tolerance`
-    times the normal force is not resolved. The stiffness is that of a further step in the same direction,
-    zero where all slides ("full": where a loop of the force has just closed it may be that of the loop).
-    Periodic bodies are without their bulk: in full contact the stiffness is NaN.
+    times the normal force is not resolved. The stiffness is that of a further step (by "full" where a loop
+    has just closed perhaps of the loop), zero where all slides. Periodic bodies are without their bulk: in
+    full contact it is NaN.
 
     Examples
     --------
