@@ -206,6 +206,7 @@ def read_raster(request: Request) -> xr.DataArray:
         ):
             _check_raster(raster, band, channel, spacing)
             heights = np.ma.filled(raster.read(band, masked=True).astype(np.float64), np.nan)
+            heights = raster.scales[band - 1] * heights + raster.offsets[band - 1]  # of integers as a rule
             transform, system, stated = raster.transform, raster.crs, raster.units[band - 1]
     # without a reference system lengths are in the unit given, or metres
     factor = float(system.linear_units_factor[1]) if system else in_metres(1.0, units or "m")

@@ -68,6 +68,18 @@ def test_missing_values_units_and_feet(tmp_path):
     np.testing.assert_allclose(np.diff(millimetres.x), 0.5)
 
 
+def test_heights_stored_as_scaled_numbers(tmp_path):
+    """A band may state scale and offset of its numbers, as one of integers does; missing ones have none."""
+    stored = 16.0 * HEIGHTS
+    stored[1, 2] = -9999.0
+    path = geotiff(tmp_path / "a.tif", heights=stored)
+    with rasterio.open(path, "r+") as file:
+        file.scales, file.offsets = (1.0 / 16.0,), (100.0,)
+    expected = HEIGHTS + 100.0
+    expected[1, 2] = np.nan
+    np.testing.assert_array_equal(fc.surfaces.read(path).values, expected)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "step"),
     [("a.asc", esri_ascii(), 2.0), ("a.grd", surfer(False), 2.0), ("b.grd", surfer(True), 2.0)],
