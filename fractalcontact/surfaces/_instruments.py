@@ -14,6 +14,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import UnreadableFile, require_library
 from fractalcontact.base.files import NETCDF_LOCK
+from fractalcontact.base.grid import METRES
 from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems
@@ -204,13 +205,13 @@ def read_raster(request: Request) -> xr.DataArray:
             rasterio.MemoryFile(content, filename=path.name.removesuffix(".gz")) as file,
             file.open() as raster,
         ):
-            _check_raster(raster, band, channel, spacing)
+            _check_raster(raster, band, request)
             heights = np.ma.filled(raster.read(band, masked=True).astype(np.float64), np.nan)
             heights = raster.scales[band - 1] * heights + raster.offsets[band - 1]  # of integers as a rule
             transform, system, stated = raster.transform, raster.crs, raster.units[band - 1]
     # without a reference system lengths are in the unit given, or metres
     factor = float(system.linear_units_factor[1]) if system else in_metres(1.0, units or "m")
-    vertical = units or stated
+    vertical = units or ("m" if stated in METRES else stated)
     heights = np.asarray(in_metres(heights, vertical) if vertical in UNITS else heights * factor)
     steps = np.array([abs(transform.e), abs(transform.a)]) * factor
     if spacing is not None:
@@ -231,16 +232,20 @@ def read_raster(request: Request) -> xr.DataArray:
     return surface_array(_observed(heights), steps.tolist(), (False, False)).assign_attrs(entries)
 
 
-def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:
+def _check_raster(raster: Any, band: int, request: Request) -> None:
     """Check for one band of real heights in projected coordinates, with rows along x."""
     transform = raster.transform
     with Problems("", UnreadableFile) as problems:
         problems.require(
-            1 <= band <= raster.count, "channel", f"a band from 0 to {raster.count - 1}", channel
+            1 <= band <= raster.count, "channel", f"a band from 0 to {raster.count - 1}", request.channel
         )
         if 1 <= band <= raster.count:
-            dtype = raster.dtypes[band - 1]
+            dtype, stated = raster.dtypes[band - 1], raster.units[band - 1]
             problems.require(np.dtype(dtype).kind in "fiu", "path", "real heights", dtype)
+            # a system in feet has heights in its feet
+            known = (None, "", *UNITS, *METRES, raster.crs.linear_units if raster.crs else None)
+            is_unit = request.units is not None or stated in known
+            problems.require(is_unit, "path", 'a unit of length; give `units` ("m", "mm" ...)', stated)
         is_degree = bool(raster.crs) and raster.crs.is_geographic
         problems.require(
             not is_degree, "path", f"projected coordinates; {PROJECT}", "longitudes and latitudes"
@@ -251,4 +256,5 @@ def _check_raster(raster: Any, band: int, channel: Any, spacing: Any) -> None:
         expected = (
             "a raster with a position; give `spacing`, or read a mask with fractalcontact.domains.read_mask"
         )
-        problems.require(not is_plain or spacing is not None, "path", expected, "an image without one")
+        is_placed = not is_plain or request.spacing is not None
+        problems.require(is_placed, "path", expected, "an image without one")

@@ -68,6 +68,28 @@ def test_missing_values_units_and_feet(tmp_path):
     np.testing.assert_allclose(np.diff(millimetres.x), 0.5)
 
 
+@pytest.mark.parametrize(
+    ("crs", "unit", "factor"),
+    [
+        ("EPSG:32632", "mm", 1e-3),
+        ("EPSG:2263", "metres", 1.0),
+        ("EPSG:2263", "US survey foot", 1200 / 3937),
+        ("EPSG:32632", "foot", None),
+    ],
+)
+def test_unit_of_a_band(tmp_path, crs, unit, factor):
+    """A unit that is none of a length, as feet beside a system in metres, must be given by the caller."""
+    path = geotiff(tmp_path / "a.tif", crs=crs)
+    with rasterio.open(path, "r+") as file:
+        file.units = (unit,)
+    if factor is None:
+        with pytest.raises(UnreadableFile, match=f"a unit of length.*'{unit}'"):
+            fc.surfaces.read(path)
+        np.testing.assert_allclose(fc.surfaces.read(path, units="cm").values, HEIGHTS / 100, rtol=1e-12)
+    else:
+        np.testing.assert_allclose(fc.surfaces.read(path).values, factor * HEIGHTS, rtol=1e-12)
+
+
 def test_heights_stored_as_scaled_numbers(tmp_path):
     """A band may state scale and offset of its numbers, as one of integers does; missing ones have none."""
     stored = 16.0 * HEIGHTS
