@@ -297,4 +297,9 @@ def _reference_system(records: Any) -> str:
         keys = [(key.id, key.value_offset) for key in getattr(record, "geo_keys", ())]
         if (1024, 2) in keys:  # of a GeoTIFF directory: the model is latitude and longitude
             return "degree"
+        lengths = {number for key, number in keys if key in (3076, 4099)}  # units of x and y, of z
+        if lengths & {9002, 9003}:  # EPSG: the international foot and that of the US survey; 9001 the metre
+            return "foot"
+        if lengths == {9001}:
+            return "metre"
     return ""

@@ -162,14 +162,15 @@ def test_clouds_in_ply(tmp_path, kind):
     np.testing.assert_allclose(surface.values, height(X, Y) / 1e3, atol=1e-18)
 
 
-def las_file(path, points, geographic=False):
+def las_file(path, points, keys=()):
     laspy = pytest.importorskip("laspy")
     header = laspy.LasHeader(point_format=0, version="1.2")
     header.scales, header.offsets = [1e-3] * 3, [5e5, 4e6, 0.0]
-    if geographic:
-        # a directory of GeoTIFF keys with one entry: the model type is geographic
-        keys = struct.pack("<8H", 1, 1, 0, 1, 1024, 0, 1, 2)
-        header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", keys))
+    if keys:
+        # a directory of GeoTIFF keys: four numbers for itself, and for each entry
+        directory = [1, 1, 0, len(keys), *(part for key, value in keys for part in (key, 0, 1, value))]
+        content = struct.pack(f"<{len(directory)}H", *directory)
+        header.vlrs.append(laspy.VLR("LASF_Projection", 34735, "", content))
     cloud = laspy.LasData(header)
     cloud.x, cloud.y, cloud.z = points.T
     cloud.write(path)
@@ -189,9 +190,20 @@ def test_longitudes_and_latitudes_are_refused(tmp_path):
     (tmp_path / "a.csv").write_text(text_lines(",", "lon,lat,z\n"))
     with pytest.raises(UnreadableFile, match="project"):
         fc.surfaces.read(tmp_path / "a.csv", columns=[0, 1, 2])
-    las_file(tmp_path / "a.las", POINTS + np.array([5e5, 4e6, 0.0]), geographic=True)
+    las_file(tmp_path / "a.las", POINTS + np.array([5e5, 4e6, 0.0]), keys=[(1024, 2)])
     with pytest.raises(UnreadableFile, match="project it to metres"):
         fc.surfaces.read(tmp_path / "a.las")
+
+
+@pytest.mark.parametrize("feet", [(3076, 9003), (4099, 9002)])
+def test_cloud_in_feet_is_refused(tmp_path, feet):
+    """GeoTIFF keys state the units of x and y (3076) and of z (4099): EPSG 9001 is the metre."""
+    far = POINTS + np.array([5e5, 4e6, 0.0])
+    las_file(tmp_path / "a.las", far, keys=[(1024, 1), (3076, 9001)])
+    assert provenance(fc.surfaces.read(tmp_path / "a.las"))["stated_unit"] == "m"
+    las_file(tmp_path / "b.las", far, keys=[(1024, 1), feet])
+    with pytest.raises(UnreadableFile, match="convert it first, got 'feet'"):
+        fc.surfaces.read(tmp_path / "b.las")
 
 
 @pytest.mark.parametrize(
