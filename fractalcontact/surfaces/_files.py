@@ -136,6 +136,8 @@ class Table:
     is_named : bool
         The first line has names, not numbers.
     decimal_comma : bool
+    comment : str
+        The last comment before the numbers.
     """
 
     values: Array
@@ -143,6 +145,7 @@ class Table:
     units: tuple[str, ...] = ()
     is_named: bool = False
     decimal_comma: bool = False
+    comment: str = ""
 
 
 def read_table(path: Path) -> Table:
@@ -188,7 +191,7 @@ def read_table(path: Path) -> Table:
     except ValueError:
         values = _parsed(rows, delimiter)
     names, units = _header(first if is_named else comment, delimiter, values.shape[1])
-    return Table(values, names, units, is_named, comma)
+    return Table(values, names, units, is_named, comma, comment)
 
 
 def _content_lines(text: str) -> tuple[list[tuple[int, str]], str]:

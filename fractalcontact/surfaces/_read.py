@@ -191,10 +191,8 @@ def _text_content(request: Request) -> xr.DataArray:
         if not (is_points or isinstance(error, EmptyTable)):
             if request.spacing is None:
                 return _instrument_or_table(request)
-            with contextlib.suppress(UnreadableFile, MissingExtra):
-                surface = read_instrument(request)
-                if surface.attrs["stated_size"] is not None:  # any text has numbers to some reader
-                    return surface
+            if (surface := _headed_content(request)) is not None:
+                return surface
         fault = f"is not a table of numbers ({error})"
         raise UnreadableFile("", [f"path: {path.name!r} {fault}"]) from error
     if _read_points.is_list(table, path, request.columns):
@@ -209,9 +207,20 @@ def _text_content(request: Request) -> xr.DataArray:
     require_readable(not is_tall, "path", expected, f"{rows} rows of {number} columns")
     if request.spacing is None:
         return _instrument_or_table(request, is_table=True)
+    if table.comment and (surface := _headed_content(request)) is not None:
+        return surface
     expected = "a grid of heights, one row to a line"
     require_readable(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
     return _heights_content(table.values, request)
+
+
+def _headed_content(request: Request) -> xr.DataArray | None:
+    """Read text whose header states its size as the file of an instrument; None of other text."""
+    with contextlib.suppress(UnreadableFile, MissingExtra):
+        surface = read_instrument(request)
+        if surface.attrs["stated_size"] is not None:  # any text has numbers to some reader
+            return surface
+    return None
 
 
 def _instrument_or_table(request: Request, *, is_table: bool = False) -> xr.DataArray:

@@ -352,6 +352,9 @@ def test_first_row_of_an_instrument_file_is_the_top(tmp_path):
     np.testing.assert_array_equal(default.values, top.values)
     np.testing.assert_array_equal(bottom.values, top.values[::-1])
     np.testing.assert_array_equal(bottom.y, top.y)
+    spaced = fc.surfaces.read(tmp_path / "a.asc", spacing=2e-6)  # replaces the spacing alone
+    np.testing.assert_array_equal(spaced.values, default.values)
+    assert float(spaced.x[1] - spaced.x[0]) == pytest.approx(2e-6)
     assert provenance(top)["parameters"]["first_row"] == "top"
     assert (provenance(default)["first_row"], provenance(bottom)["first_row"]) == ("top", "bottom")
 
