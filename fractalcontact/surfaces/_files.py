@@ -18,6 +18,7 @@ import numpy as np
 from fractalcontact.base.errors import FractalContactError, UnreadableFile
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import require_unpacked, unpacked_limit
+from fractalcontact.base.units import UNITS
 from fractalcontact.base.validation import NONE, Problems
 
 RATIO = 50  # unpacked over packed size; that of measured surfaces is below 20
@@ -234,10 +235,17 @@ def _header(line: str, delimiter: str | None, columns: int) -> tuple[tuple[str, 
     parts = line.split(delimiter) if delimiter else [match.group() for match in HEADED.finditer(line)]
     while len(parts) > columns and not parts[-1].strip():
         parts.pop()
-    matches = [match for part in parts if (match := HEADED.match(part.strip().strip("\"'").strip()))]
+    matches = [match for part in parts if (match := HEADED.fullmatch(part.strip().strip("\"'").strip()))]
     if not len(matches) == len(parts) == columns:
         return (), ()
-    return tuple(match["name"].strip() for match in matches), tuple(match["unit"] or "" for match in matches)
+    headed = [_name_and_unit(match["name"].strip(), match["unit"]) for match in matches]
+    return tuple(name for name, _ in headed), tuple(unit for _, unit in headed)
+
+
+def _name_and_unit(name: str, unit: str | None) -> tuple[str, str]:
+    """Return name and unit of a column; a unit may be the last word without brackets."""
+    first, _, last = name.rpartition(" ")
+    return (first, last) if unit is None and first and last in UNITS else (name, unit or "")
 
 
 def _parsed(lines: list[tuple[int, str]], delimiter: str | None) -> Array:

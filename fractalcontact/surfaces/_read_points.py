@@ -210,8 +210,9 @@ def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> l
 
 
 def _place(names: list[str], group: Sequence[str]) -> int | None:
-    """Return the number of the column that is called as one of a group."""
-    return next((names.index(name) for name in group if name in names), None)
+    """Return the number of the column whose first word is one of a group."""
+    words = [name.partition(" ")[0] for name in names]
+    return next((words.index(name) for name in group if name in words), None)
 
 
 def _mesh(path: Path, suffix: str) -> xr.Dataset:

@@ -43,6 +43,8 @@ LISTS = {
     "blank.xyz": text_lines(" "),
     "comma.csv": text_lines(",", "x,y,z\n"),
     "units.csv": text_lines(",", "X [mm],Y [mm],Z [mm]\n", 1e3 * POINTS),
+    "words.csv": text_lines(",", "X position [mm],Y position [mm],Z position [mm]\n", 1e3 * POINTS),
+    "bare.csv": text_lines(";", "x mm;y mm;z mm\n", 1e3 * POINTS),
     "semicolon.txt": text_lines(";", '"Z";"X";"Y"\n', POINTS[:, [2, 0, 1]]),
     "decimal.csv": text_lines(";", "x;y;z\n").replace(".", ","),
     "decimal_blanks.txt": text_lines("\t").replace(".", ","),
