@@ -307,7 +307,7 @@ def _triangulated(
     """Return heights that are linear in triangles, NaN outside them."""
     origin = points[:, :2].min(axis=0)
     flat = points[:, :2] - origin
-    triangles = _delaunay(flat) if given is None else given
+    triangles, z = _delaunay(flat, points[:, 2]) if given is None else (given, points[:, 2])
     corners = flat[triangles]
     sides = corners - np.roll(corners, 1, axis=1)
     longest = np.sqrt((sides**2).sum(axis=-1).max(axis=1))
@@ -325,7 +325,7 @@ def _triangulated(
     step = _step(spacing, mean_distance, distance if given is None else 0.0)
     y, x = _centres(points[:, 1::-1].min(axis=0), points[:, 1::-1].max(axis=0), step, cells)
     heights = np.full((y.size, x.size), np.nan)
-    flat, z, faces = (np.ascontiguousarray(array) for array in (flat, points[:, 2], triangles[kept]))
+    flat, z, faces = (np.ascontiguousarray(array) for array in (flat, z, triangles[kept]))
     _fill_triangles(flat, z, faces, y - origin[1], x - origin[0], heights)
     facts: dict[str, Any] = {"point_distance": distance}
     if given is not None:
@@ -337,8 +337,8 @@ def _triangulated(
     return _gridded(heights, (y, x), _finest(distance, step), method, facts)
 
 
-def _delaunay(flat: Array) -> Array:
-    """Return the Delaunay triangulation of points in the plane."""
+def _delaunay(flat: Array, z: Array) -> tuple[Array, Array]:
+    """Return the Delaunay triangulation of points in the plane, and heights, averaged at one position."""
     from scipy.spatial import Delaunay, QhullError  # loads slowly
 
     try:
@@ -346,7 +346,11 @@ def _delaunay(flat: Array) -> Array:
     except (QhullError, ValueError) as error:
         message = "points: expected points that span an area in the plane, got points on one line"
         raise InvalidInput("", [message]) from error
-    return np.asarray(triangulation.simplices, dtype=np.int64)
+    # of points at one position one is a corner, and the others are coplanar with the facets there
+    repeated, _, corner = triangulation.coplanar.T
+    total = z + np.bincount(corner, weights=z[repeated], minlength=z.size)
+    heights = total / (1 + np.bincount(corner, minlength=z.size))
+    return np.asarray(triangulation.simplices, dtype=np.int64), heights
 
 
 def _bridged(

@@ -129,6 +129,16 @@ def test_duplicate_points_and_missing_rows():
     np.testing.assert_allclose(surface, fc.surfaces.from_points(points, 0.05, plane="xy"), atol=1e-12)
 
 
+def test_heights_at_one_position_are_averaged():
+    """Two scans of the same positions have their mean, in whatever order they come."""
+    flat = scattered(600)
+    low, high = (np.c_[flat, flat[:, 1] + offset] for offset in (0.0, 0.5))
+    expected = fc.surfaces.from_points(low, 0.05, plane="xy").values + 0.25
+    for repeated in (np.r_[low, high], np.r_[high, low]):
+        surface = fc.surfaces.from_points(repeated, 0.05, plane="xy")
+        np.testing.assert_allclose(surface.values, expected, atol=1e-12)
+
+
 def test_mesh_uses_its_own_triangles():
     """A roof of two rectangles has its ridge, which the triangulation of the corners would not find."""
     points = [[0, 0, 0], [4, 0, 0], [0, 2, 1], [4, 2, 1], [0, 4, 0], [4, 4, 0]]
