@@ -171,7 +171,7 @@ def _height(parts: Iterable[str]) -> int:
 
 
 def _fitted(tables: Sequence[ResultTable], lines: int) -> list[str]:
-    """Return tables that fit so many lines: they lose rows first, then the last are left out.
+    """Return tables that fit so many lines: they lose rows first, then columns, then the last are left out.
 
     Those of strength are left out after all others: a scene has them where its user gives the strength of the
     walls or the friction angle, to ask for them.
@@ -179,9 +179,9 @@ def _fitted(tables: Sequence[ResultTable], lines: int) -> list[str]:
     kept = list(tables)
     while kept:
         words = 2 if len(kept) < len(tables) else 0  # lines of what is said of those left out
-        shown = _thinned(kept, lines - words)
-        if shown:
-            return shown
+        for each in (kept, [_narrowed(one) for one in kept]):
+            if shown := _thinned(each, lines - words):
+                return shown
         del kept[max(range(len(kept)), key=lambda i: (not _has_strength(kept[i]), i))]
     return []
 
@@ -197,6 +197,17 @@ def _thinned(tables: Sequence[ResultTable], lines: int, fewest: int = 3) -> list
         rows[longest] -= 1
         shown[longest] = table(tables[longest].shortened(rows[longest]).rows, rule=False)
     return shown
+
+
+def _narrowed(each: ResultTable) -> ResultTable:
+    """Return a table without its last columns where cells of it would take several lines each."""
+    while len(each.heads) > 1:
+        lines = table(each.rows).splitlines()
+        rule = next(place for place, line in enumerate(lines) if not line.strip("- "))
+        if len(lines) - rule - 1 <= len(each.keys):
+            break
+        each = each.selected(each.heads[:-1])
+    return each
 
 
 def _has_strength(each: ResultTable) -> bool:

@@ -436,3 +436,23 @@ def test_strength_is_on_the_screen_where_not_all_tables_are(strong_joint, column
         assert name in text
     assert "1 of " not in text
     assert "2 of " not in text
+
+
+def test_columns_of_wide_cells_are_left_out_before_tables(strong_joint, monkeypatch):
+    """In a narrow window the scatter of JRC takes two lines a row; without it one more table fits."""
+    face = fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=6e-5, rng=3)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=4.8e-3, basic_friction_angle=32)
+    shear, pressures = [0.0, 2e-4, 8e-4, 1.6e-3], [1e6, 3e6, 10e6]
+    gap = fc.joints.closure(crack, shear=shear, nominal_pressure=1e7, keep="gap")["gap"].isel(step=-1)
+    sheared = fc.joints.direct_shear(crack, path=1.6e-3, nominal_pressure=pressures, hardness=120e6)
+    groups = {f"joints/{name}": node.to_dataset() for name, node in strong_joint["joints"].children.items()}
+    flow = fc.joints.transmissivity(gap)
+    tree = xr.DataTree.from_dict(groups | {"joints/direct_shear": sheared, "joints/transmissivity": flow})
+    monkeypatch.setenv("COLUMNS", "70")
+    narrow = fc.scenes.summary(tree)
+    assert len(narrow.splitlines()) <= 36
+    assert "tables left out: 1;" in narrow
+    assert "rigid" in narrow
+    assert "scatter" not in narrow
+    monkeypatch.setenv("COLUMNS", "110")
+    assert "scatter of the profiles" in fc.scenes.summary(tree)
