@@ -71,8 +71,23 @@ def _slip_limits(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         yield f"shear over normal stiffness of the joint: {ratios} (theory)"
 
 
+def _mean_plane(state: xr.Dataset) -> xr.DataArray | None:
+    """Return the root mean square height of the mean plane where it carries more than half of Sq².
+
+    ISO 25178 removes the plane first; the faces of a joint keep theirs. An axis that repeats is level.
+    """
+    free = [dim for dim in ("y", "x") if dim in state.coords and "period" not in state[dim].attrs]
+    if not free or "mean_slope_x" not in state:
+        return None
+    square = sum(state[f"mean_slope_{dim}"] ** 2 * state[dim].var() for dim in free)
+    if not bool((square > 0.5 * state["rms_height"] ** 2).all()):
+        return None
+    return state["rms_height"].copy(data=np.sqrt(square))
+
+
 STATISTICS = (
     Column("Sq", "rms_height"),
+    Column("of it the mean plane", _mean_plane),
     Column("Sa", "mean_absolute_height", screen=False),
     Column("Sp", "peak_height", screen=False),
     Column("Sv", "valley_depth", screen=False),

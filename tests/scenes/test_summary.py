@@ -274,6 +274,19 @@ def test_summary_has_roughness_and_parameters_of_iso_25178():
     assert "smallest roughness metric" not in fc.scenes.summary(single)
 
 
+@pytest.mark.parametrize("periodic", [False, True])
+def test_mean_plane_is_shown_beside_the_rms_height(periodic):
+    """Sq of a tilted face is that of its plane, for the most part; an axis that repeats has no tilt."""
+    heights = np.tile(1e-5 * np.sin(2 * np.pi * (np.arange(64) + 0.5) / 64), (48, 1))
+    if not periodic:
+        heights += 0.1 * 1e-4 * np.arange(48)[:, None]
+    face = fc.surfaces.from_array(heights, 1e-4, periodic=periodic)
+    tree = xr.DataTree.from_dict({"/surfaces": fc.surfaces.describe(face).assign(height=face)})
+    values = {cells["quantity"]: cells["value"] for cells in rows(tree, "ISO 25178")}
+    plane = np.sqrt(float(face.var()) - float(fc.surfaces.level(face).var()))
+    assert values.get("of it the mean plane") == (None if periodic else f"{1e6 * plane:.3g} µm")
+
+
 @pytest.mark.parametrize(("increment", "outside"), [(1e-8, True), (3e-5, False)])
 def test_coefficient_beyond_the_standard_profiles_is_told(increment, outside):
     surface = fc.surfaces.fbm((64, 64), 2e-4, hurst=0.7, rms_increment=increment, rng=3)
