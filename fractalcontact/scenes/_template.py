@@ -205,7 +205,8 @@ def _words(scan: Files) -> str:
     """Return the name of a file, or of the folder of many."""
     files = _files(scan)
     several = len(files) > 1 or is_pattern(str(scan))
-    return f"the scans in {files[0].resolve().parent.name}" if several else files[0].name
+    folder = Path(os.path.commonpath([file.resolve().parent for file in files])).name
+    return f"the scans in {folder}" if several else files[0].name
 
 
 def _first_surface(scan: Files, options: Mapping[str, Any]) -> xr.DataArray:

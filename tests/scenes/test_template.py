@@ -392,3 +392,14 @@ def test_loads_are_those_of_the_surface_that_is_pressed(scans, fault):
         for name in ("clean.nc", "faulty.nc")
     ]
     assert loads[1]["last"] == pytest.approx(loads[0]["last"], rel=0.02)
+
+
+def test_title_of_scans_in_several_folders_names_the_folder_of_all(tmp_path):
+    for name in ("one", "two"):
+        (tmp_path / "samples" / name).mkdir(parents=True)
+        face = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+        fc.save(face, tmp_path / "samples" / name / "scan.nc")
+    pattern = str(tmp_path / "samples" / "*" / "scan.nc")
+    assert 'title = "Roughness of the scans in samples"' in fc.scenes.template("roughness", pattern)
+    (tmp_path / "samples" / "two" / "scan.nc").unlink()
+    assert 'title = "Roughness of the scans in one"' in fc.scenes.template("roughness", pattern)
