@@ -274,6 +274,15 @@ def test_summary_has_roughness_and_parameters_of_iso_25178():
     assert "smallest roughness metric" not in fc.scenes.summary(single)
 
 
+def test_slopes_of_a_polished_surface_are_not_shown_as_zero():
+    surface = fc.surfaces.spectral((64, 64), 1e-6, hurst=0.8, rms_slope=4e-4, rng=1)
+    statistics = fc.surfaces.describe(surface)
+    cells = rows(xr.DataTree.from_dict({"/surfaces": statistics}), "ISO 25178")
+    values = {each["quantity"]: each["value"] for each in cells}
+    assert float(values["Sdq"]) == pytest.approx(4e-4)
+    assert float(values["Sdr"]) == pytest.approx(float(statistics.developed_area_excess), rel=5e-3)
+
+
 @pytest.mark.parametrize("periodic", [False, True])
 def test_mean_plane_is_shown_beside_the_rms_height(periodic):
     """Sq of a tilted face is that of its plane, for the most part; an axis that repeats has no tilt."""
