@@ -207,7 +207,9 @@ def _achieved_lines(group: Header) -> Iterable[str]:
             yield f"    {word}: {finite.sum():.3g} s"
         else:
             ends = dict.fromkeys(f"{value:.3g}" for value in (finite.min(), finite.max()))
-            yield f"    {word}: {' ... '.join(ends)}"
+            units = group.variables[name][1].get("units", "")
+            unit = "" if units in ("", "1") else f" {units}"
+            yield f"    {word}: {' ... '.join(ends)}{unit}"
 
 
 def _reason_lines(group: Header) -> Iterable[str]:

@@ -188,6 +188,14 @@ def test_kept_stages_of_a_changed_scene_are_not_used(tmp_path, monkeypatch, old,
     assert set(calls) & {"closure", "dilatancy"} == recomputed
 
 
+def test_info_states_the_unit_of_an_error(tmp_path):
+    surface = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+    placed = fc.joints.register(surface, surface + 1e-3)
+    text = file_contents(fc.save(placed, tmp_path / "placed.nc"))
+    assert f"shift x error: {float(placed.shift_x_error):.3g} m\n" in text
+    assert f"rotation error: {float(placed.rotation_error):.3g} degree\n" in text
+
+
 def test_summary_and_info_print_the_main_results(study, tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")  # no head of a table is broken
     tree, out = study
