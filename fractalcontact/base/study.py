@@ -6,6 +6,10 @@ import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from fractalcontact.base.units import quantity_text
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -72,19 +76,21 @@ def stated_argument(entry: Any, names: Sequence[str]) -> str:
     return stated[0] if stated else stated_argument(list(entry.values()), names)
 
 
+def end_of_first_leg(test: xr.Dataset) -> str:
+    """Return the shear at which a shear test first turns or ends; empty of a result without its path.
+
+    Every leg has both its ends.
+    """
+    if not {"shear", "point"} <= {*test.variables, *test.sizes}:
+        return ""
+    positions = test["shear"].transpose(..., "point").values
+    legs = positions.reshape(-1, test.sizes["point"])[0, 1:]  # the first of its points is before all legs
+    turns = np.flatnonzero(np.diff(legs) == 0.0)
+    return quantity_text(legs[turns[0] if turns.size else -1], "m")
+
+
 def scene_of(data: Any) -> dict[str, Any]:
     """Return the scene of a study, from the provenance of its root; empty for other data."""
     parameters = provenance_of(data).get("parameters")
     scene = parameters.get("scene") if isinstance(parameters, dict) else None
     return scene if isinstance(scene, dict) else {}
-
-
-def end_of_first_leg(test: Any) -> float | None:
-    """Return where a direct shear test first reverses, or ends (m); None where its path is not known."""
-    path = provenance_of(test).get("parameters", {}).get("path", [])
-    end = None
-    for place in path if isinstance(path, list) else [path]:
-        if end is not None and (place > end) != (end > 0):
-            break
-        end = place
-    return end

@@ -76,7 +76,7 @@ def strength_envelope(
     if tests is not None:
         tested = result_of(tests, (*TESTS, dims[1]), dims[1:], argument="tests")
         end = end_of_first_leg(tested)
-        place = "" if end is None else f" ({quantity_text(end, 'm')})"
+        place = f" ({end})" if end else ""
         for name, (kind, marker) in TESTS.items():
             style = {"ls": "", "marker": marker, "color": _style.ink(), "zorder": 3}
             label = f"direct shear, {kind}{place if kind == AT_END else ''}"

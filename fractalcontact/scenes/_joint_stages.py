@@ -124,11 +124,6 @@ def _peak_distance(state: xr.Dataset) -> str | None:
     return length(state["peak_distance"].max()) if "peak_distance" in state else None
 
 
-def _end_of_first_leg(test: xr.Dataset) -> str | None:
-    end = end_of_first_leg(test)
-    return None if end is None else length(end)
-
-
 def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:
     """Yield what each criterion assumes, and at which of the pressures it is in its range."""
     data = tree["joints/strength_envelope"].to_dataset()
@@ -445,7 +440,7 @@ STAGES = (
         Column("peak strength", "peak_shear_strength"),
         Column("friction angle", "peak_friction_angle"),
         Column("strength at the end", "residual_shear_strength"),
-        Column("end at shear", _end_of_first_leg, screen=False),
+        Column("end at shear", end_of_first_leg, screen=False),
         Column("worn depth", lambda state: state["wear_depth"].max("point", keep_attrs=True)),
         splits=("nominal_pressure",),
         one_direction=True,

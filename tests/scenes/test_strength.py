@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
@@ -108,6 +109,28 @@ def test_results_are_those_of_the_functions(scene, tmp_path):
     assert "strength at the end" in summary
     again = fc.scenes.reproduce(stored.to_dataset())
     np.testing.assert_array_equal(again.shear_stress, stored.shear_stress)
+
+
+@pytest.mark.parametrize(
+    ("path", "end"), [([6e-4, 2e-4], "0.6 mm"), ([-4e-4, -8e-4], "-400 µm"), ([4e-4], "400 µm")]
+)
+def test_end_of_the_first_leg_is_that_of_any_path(path, end):
+    """A path may be labelled, and go on in the same direction; the figure says the same as the table."""
+    face = fc.surfaces.fbm((24, 24), 2e-4, hurst=0.7, rms_increment=2e-5, rng=3)
+    crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=2.4e-3, basic_friction_angle=31)
+    labelled = xr.DataArray(path, dims="leg")
+    test = fc.joints.direct_shear(crack, labelled, nominal_pressure=[1e6, 2e6], hardness=3e8)
+    tree = xr.DataTree.from_dict({"joints/direct_shear": test})
+    assert f" {end} " in fc.scenes.summary(tree, verbose=True)
+    envelope = fc.joints.strength_envelope(
+        face, nominal_pressure=[1e6, 2e6], wall_strength=1e8, basic_friction_angle=31
+    )
+    axes = fc.plotting.strength_envelope(envelope, tests=test)
+    texts = [
+        text.get_text().replace("\n", " ")
+        for text in axes.figure.findobj(lambda each: hasattr(each, "get_text"))
+    ]
+    assert any(f"({end})" in text for text in texts)
 
 
 @pytest.mark.parametrize(
