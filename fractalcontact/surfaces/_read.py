@@ -211,7 +211,17 @@ def _text_content(request: Request) -> xr.DataArray:
         return surface
     expected = "a grid of heights, one row to a line"
     require_readable(min(table.values.shape) > 1, "path", expected, f"shape {table.values.shape}")
+    expected = "heights alone, as `spacing` states where they are"
+    got = Words("coordinates in the first row and column")
+    require_readable(not _has_coordinates(table.values), "path", expected, got)
     return _heights_content(table.values, request)
+
+
+def _has_coordinates(values: Array) -> bool:
+    """Return whether first row and column of a table are evenly spaced beside an empty corner."""
+    steps = np.diff(values[0, 1:]), np.diff(values[1:, 0])
+    are_even = [each.size > 1 and bool(np.ptp(each) < 0.01 * abs(each[0])) for each in steps]
+    return bool(np.isnan(values[0, 0])) and all(are_even)
 
 
 def _headed_content(request: Request) -> xr.DataArray | None:

@@ -601,3 +601,17 @@ def test_table_without_spacing_says_so_with_and_without_the_extra(tmp_path, monk
         "spacing: expected the spacing in metres (on the command line `--spacing 0.3mm`), for 'heights.csv' "
         "as a table of heights, got None"
     ]
+
+
+@pytest.mark.parametrize("corner", ["", "nan"])
+def test_coordinates_beside_a_table_are_not_heights(tmp_path, corner):
+    """Spreadsheets and pandas write them; read as heights they would exceed all others."""
+    heights = np.random.default_rng(1).normal(size=(5, 6))
+    rows = [[corner, *map(str, 0.3 * np.arange(6))]]
+    rows += [[str(0.3 * k), *map(str, row)] for k, row in enumerate(heights)]
+    (tmp_path / "map.csv").write_text("\n".join(map(",".join, rows)))
+    with pytest.raises(UnreadableFile, match="coordinates in the first row and column"):
+        fc.surfaces.read(tmp_path / "map.csv", spacing=3e-4, units="mm")
+    rows[0][3] = "0.8"  # heights, one of them missing
+    (tmp_path / "map.csv").write_text("\n".join(map(",".join, rows)))
+    assert fc.surfaces.read(tmp_path / "map.csv", spacing=3e-4, units="mm").shape == (6, 7)
