@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.grid import DECADES
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import Array, as_array
@@ -100,6 +100,11 @@ def from_points(
     ------
     InvalidInput
         Too few points, all on one line, too thick a cloud for a plane, or a spacing that does not fit it.
+
+    Warns
+    -----
+    FractalContactWarning
+        More than twice as many points as positions: their coordinates were rounded, or several scans repeat.
 
     Notes
     -----
@@ -202,6 +207,14 @@ def _lattice(points: Array, spacing: float | None, cells: tuple[_Axis, ...] | No
     with np.errstate(invalid="ignore"):
         heights = (total / np.where(count > 0, count, np.nan)).reshape(shape)
     facts = {"repeated_nodes": int(np.count_nonzero(count > 1))}
+    nodes = int(np.count_nonzero(count))
+    # two scans of the same positions are common, and an STL file repeats the corners of its triangles
+    if index.size > 2 * nodes and (distinct := len(np.unique(points, axis=0))) > 2 * nodes:
+        message = (
+            f"{distinct} points are at {nodes} positions of a grid, and their heights are averaged; if the "
+            "positions were rounded, as 32-bit numbers far from the origin are, finer roughness is lost"
+        )
+        warn(f"fractalcontact.surfaces.from_points: {message}", FractalContactWarning)
     centres = tuple(axis.centres for axis in axes)
     return _gridded(heights, centres, None, "none: the points are on a grid", facts)
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import LinearNDInterpolator
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import FractalContactWarning, InvalidInput
 
 RNG = np.random.default_rng(5)
 
@@ -137,6 +137,18 @@ def test_heights_at_one_position_are_averaged():
     for repeated in (np.r_[low, high], np.r_[high, low]):
         surface = fc.surfaces.from_points(repeated, 0.05, plane="xy")
         np.testing.assert_allclose(surface.values, expected, atol=1e-12)
+
+
+def test_positions_that_lost_their_digits_warn():
+    """In 32-bit numbers, positions 5e5 m from the origin are multiples of 31 mm."""
+    points = np.c_[scattered(4000), 1e-3 * np.sin(np.arange(4000))]
+    far = (points + np.array([5e5, 5e5, 0.0])).astype(np.float32)
+    with pytest.warns(FractalContactWarning, match="points are at .* positions of a grid"):
+        fc.surfaces.from_points(far)
+    exact = fc.surfaces.from_points(points + np.array([5e5, 5e5, 0.0]))  # no warning
+    assert float(exact.x[1] - exact.x[0]) < 0.02
+    nodes = np.c_[np.indices((5, 6)).reshape(2, -1).T, np.arange(30.0)]
+    fc.surfaces.from_points(np.repeat(nodes, 6, axis=0))  # the corners of a mesh: no warning
 
 
 def test_mesh_uses_its_own_triangles():
