@@ -92,7 +92,7 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         name = str(line.get_label())
         label = name if name.startswith("_") else f"{name}, central 68 %"
         ax.fill(x, y, color=line.get_color(), alpha=BAND_OPACITY, linewidth=0, zorder=0.5, label=label)
-        limits = _widened(limits[0], x), _widened(limits[1], y)
+        limits = _widened(limits[0], x, ax.get_xscale()), _widened(limits[1], y, ax.get_yscale())
         count += 1
     if count:
         ax.set_xlim(limits[0])
@@ -113,11 +113,13 @@ def _factor(axis: Any) -> float:
     return float(getattr(axis, "factor", 1.0))
 
 
-def _widened(limits: tuple[float, float], values: np.ndarray[Any, Any]) -> tuple[float, float]:
-    """Return the limits of an axis with all values inside; those of an inverted axis stay."""
+def _widened(limits: tuple[float, float], values: np.ndarray[Any, Any], scale: str) -> tuple[float, float]:
+    """Return the limits of an axis with all values that it can show; those of an inverted axis stay."""
     low, high = limits
     if low > high:
         return limits
+    if scale == "log":
+        values = values[values > 0]
     return min(low, float(values.min(initial=low))), max(high, float(values.max(initial=high)))
 
 

@@ -88,3 +88,11 @@ def test_single_study_has_neither_bands_nor_words(drawn):
     for curves, bands, words in drawn(single).values():
         assert not bands or not curves
         assert words == ""
+
+
+def test_band_from_no_load_on_draws_without_warning(drawn, recwarn):
+    """On a logarithmic axis the first point, at which nothing touches, is beyond the limits."""
+    faces = fc.surfaces.spectral((16, 16), 1e-5, hurst=0.8, rms_slope=0.05, members=3, rng=5)
+    pressed = fc.contact.press(faces, contact_modulus=1e10, nominal_pressure=[0.0, 1.0, 1e7], keep="state")
+    assert "contact_area" in drawn(xr.DataTree.from_dict({"contact": pressed}))
+    assert [str(warning.message) for warning in recwarn if "non-positive" in str(warning.message)] == []
