@@ -230,6 +230,7 @@ def _facts(surface: xr.DataArray) -> dict[str, Any]:
     grid = read_grid(surface)
     return {
         "spacing": max(grid.spacing),
+        "cell": grid.spacing[1],  # along x, in which joints are sheared
         "extent": min(grid.extent),
         "missing": bool(surface.isnull().any()),
         "periodic": any(grid.periodic),
@@ -281,9 +282,9 @@ def _loads(slope: float, young: Any, poisson: float) -> dict[str, Any]:
 
 def _travel(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Return the block of a joint, its shears, and the range of its travel."""
-    step = facts["spacing"]
+    block = facts["spacing"] * math.floor(0.6 * facts["extent"] / facts["spacing"])
+    step = facts["cell"]
     # a block in the middle can slide by .2 of the extent either way, farther than .15
-    block = step * math.floor(0.6 * facts["extent"] / step)
     farthest = step * math.floor(0.15 * facts["extent"] / step)
     shears = [0.0, *(_rounded(step * max(1, round(share * farthest / step))) for share in (0.1, 0.3, 1.0))]
     return {

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.errors import FractalContactError, InvalidInput, ScaleWarning, TooLittleMemory, warn
-from fractalcontact.base.grid import distinct, plane_coords, read_grid
+from fractalcontact.base.grid import UNIFORM, distinct, plane_coords, read_grid
 from fractalcontact.base.numbers import real_numbers
 from fractalcontact.base.resources import require_memory
 from fractalcontact.base.schema import label
@@ -181,9 +181,20 @@ def _validate_surfaces(scene: Scene, problems: Problems) -> dict[str, xr.DataArr
                 # a generator may reach sizes that float64 does not hold
                 if problems.surface(name, made, finite=False, smallest=1, leading=True):
                     surfaces[name] = made
-    if set(surfaces) == {"surface", "upper"} and not scene.joint.register:
-        require_above(surfaces["upper"], surfaces["surface"], problems)
+    if set(surfaces) == {"surface", "upper"}:
+        if scene.joint.register:
+            _require_square_cells(surfaces["surface"], problems)
+        else:
+            require_above(surfaces["upper"], surfaces["surface"], problems)
     return surfaces
+
+
+def _require_square_cells(lower: xr.DataArray, problems: Problems) -> None:
+    """Require cells that a face can be turned on."""
+    steps = read_grid(lower).spacing
+    expected = "one spacing along x and y, to turn a face; or register = false (--as-scanned)"
+    got = Words(" and ".join(quantity_text(step, "m") for step in steps[::-1]))
+    problems.require(abs(steps[0] / steps[1] - 1.0) <= UNIFORM, "joint.register", expected, got)
 
 
 def require_above(upper: xr.DataArray, lower: xr.DataArray, problems: Problems) -> None:

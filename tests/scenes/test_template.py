@@ -394,6 +394,32 @@ def test_loads_are_those_of_the_surface_that_is_pressed(scans, fault):
     assert loads[1]["last"] == pytest.approx(loads[0]["last"], rel=0.02)
 
 
+@pytest.mark.parametrize("spacing", [(2.5e-4, 1.7e-4), (2e-4, 3e-4)])
+def test_joint_of_faces_with_unequal_spacings(scans, capsys, spacing):
+    """Shears are whole cells along x; such a face cannot be turned into mated position."""
+    lower = fc.surfaces.fbm((64, 64), spacing, hurst=HURST, rms_increment=1e-5, rng=3)
+    fc.save(lower, "oblong.nc")
+    fc.save(lower + 1e-3, "above.nc")
+    command = [
+        "joint",
+        "oblong.nc",
+        "above.nc",
+        "--young",
+        "30GPa",
+        "--friction-angle",
+        "30",
+        "--jcs",
+        "60MPa",
+    ]
+    assert main([*command, "--quiet"]) == 2
+    assert "joint.register: expected one spacing along x and y" in capsys.readouterr().err
+    assert main([*command, "--as-scanned", "--scene"]) == 0
+    scene = tomllib.loads(capsys.readouterr().out)
+    assert fc.scenes.validate(fc.scenes.Scene("joint", scene, scans)).name == "joint"
+    cells = np.array(scene["joint"]["shear"]) / spacing[1]
+    np.testing.assert_allclose(cells, np.rint(cells), atol=1e-6)
+
+
 def test_title_of_scans_in_several_folders_names_the_folder_of_all(tmp_path):
     for name in ("one", "two"):
         (tmp_path / "samples" / name).mkdir(parents=True)
