@@ -307,10 +307,11 @@ def _channel(names: Sequence[str], request: Request, kind: str) -> str:
 
 def _array_content(values: Array, request: Request) -> xr.DataArray:
     """Return an array of a numpy file: heights, or points in two or three columns."""
-    has_points = values.ndim == 2 and values.shape[1] in (2, 3) and values.dtype.kind in "iuf"
-    if has_points and len(values) >= _read_points.LEAST_POINTS:
-        points = _read_points.labelled_points(values.astype(np.float64), None, {})
-        return _gridded_points(points, replace(request, plane=None))
+    path, columns = request.path, request.columns
+    if values.ndim == 2 and values.dtype.kind in "iuf":
+        table = _files.Table(values.astype(np.float64))
+        if _read_points.is_list(table, path, columns):
+            return _gridded_points(_read_points.listed_points(table, path, columns), request)
     return _heights_content(values, request)
 
 

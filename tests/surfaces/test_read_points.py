@@ -291,3 +291,23 @@ def test_scene_reads_a_mesh(tmp_path):
         fc.surfaces.read(tmp_path / "scan.ply", units="mm", spacing=2.5e-4, plane="xy")
     )
     assert float(result["surfaces"]["rms_height"]) == float(expected.rms_height)
+
+
+@pytest.mark.filterwarnings("ignore::fractalcontact.base.errors.ScaleWarning")  # both faces are flat
+@pytest.mark.parametrize("suffix", ["npy", "npz", "csv"])
+def test_plane_and_columns_of_an_array_are_those_of_a_list(tmp_path, suffix):
+    """Points of numpy files, with their numbers in front, are gridded as those of text are."""
+    rng = np.random.default_rng(4)
+    for name, offset in (("lower", 0.0), ("upper", 0.02)):
+        x, y = rng.uniform(0.0, 1.0, (2, 2000))
+        points = np.c_[np.arange(2000), x, y, 0.5 * x + offset]
+        path = tmp_path / f"{name}.{suffix}"
+        if suffix == "csv":
+            np.savetxt(path, points, delimiter=",")
+        else:
+            (np.save if suffix == "npy" else np.savez)(path, points)
+    options = {"spacing": 0.05, "columns": [1, 2, 3]}
+    lower = fc.surfaces.read(tmp_path / f"lower.{suffix}", **options)
+    upper = fc.surfaces.read(tmp_path / f"upper.{suffix}", plane=lower, **options)
+    gap = (upper - lower).values
+    np.testing.assert_allclose(gap[np.isfinite(gap)], 0.02 / np.hypot(1.0, 0.5), atol=1e-12)
