@@ -138,6 +138,9 @@ def read(
     source = Path(path)
     with reading("", source):
         surface = file_content(Request(source, channel, units, spacing, first_row, columns, plane))
+        for name, value in {"columns": columns, "plane": plane}.items():
+            is_used = value is None or "gridding" in surface.attrs
+            require_readable(is_used, name, f"None for heights, as those of {source.name!r}", value)
         digest = file_checksum(source)
     stated = surface.attrs["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):

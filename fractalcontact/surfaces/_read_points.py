@@ -135,6 +135,9 @@ def labelled_points(
 def point_content(path: Path, columns: Sequence[str | int] | None) -> xr.Dataset:
     """Read a file of points with the reader of its format."""
     suffix = _files.file_suffix(path)
+    if suffix in (*MESHES, *CLOUDS):
+        expected = f"None for {suffix}, which states what is x, y and z"
+        _files.require_readable(columns is None, "columns", expected, columns)
     if suffix in MESHES:
         return _mesh(path, suffix)
     if suffix in CLOUDS:

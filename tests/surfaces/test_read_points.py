@@ -311,3 +311,15 @@ def test_plane_and_columns_of_an_array_are_those_of_a_list(tmp_path, suffix):
     upper = fc.surfaces.read(tmp_path / f"upper.{suffix}", plane=lower, **options)
     gap = (upper - lower).values
     np.testing.assert_allclose(gap[np.isfinite(gap)], 0.02 / np.hypot(1.0, 0.5), atol=1e-12)
+
+
+def test_columns_and_plane_without_effect_are_refused(tmp_path):
+    pytest.importorskip("trimesh")
+    (tmp_path / "a.ply").write_bytes(ply("ascii"))
+    for read in (fc.surfaces.read, fc.surfaces.read_points):
+        with pytest.raises(UnreadableFile, match="columns: expected None for .ply"):
+            read(tmp_path / "a.ply", columns=[0, 2, 1])
+    np.save(tmp_path / "a.npy", np.eye(5))
+    for option in ({"plane": "xy"}, {"plane": "fit"}):
+        with pytest.raises(UnreadableFile, match="plane: expected None for heights"):
+            fc.surfaces.read(tmp_path / "a.npy", spacing=1e-3, units="mm", **option)
