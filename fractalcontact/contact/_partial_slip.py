@@ -125,9 +125,8 @@ def partial_slip(
     directions: within a few per cent on isotropic surfaces. Under a lay, displacement and dissipated energy
     are up to (2 - nu)/(2 - 2 nu) times the true ones across it, down to 1 - nu/2 times along it. Neither
     method has the change of the pressure between dissimilar bodies. A change of the force below `tolerance`
-    times the normal force is not resolved. The stiffness is that of a further step (by "full" where a loop
-    has just closed perhaps of the loop), zero where all slides. Periodic bodies are without their bulk: in
-    full contact it is NaN.
+    times the normal force is not resolved. The stiffness is that of a further step, zero where all slides
+    ("full": perhaps of a loop that has just closed), and of periodic bodies without bulk (full contact: NaN).
 
     Examples
     --------
