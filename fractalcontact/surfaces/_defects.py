@@ -106,18 +106,19 @@ def _spikes(heights: Array, size: int, threshold: float) -> tuple[Array, float]:
 
     Notes
     -----
-    Flagged points are left out of the medians of the next pass, so that a spike of several points is removed
-    from its edge inwards. The scale of the residual is that of the first pass.
+    Flagged points have the median around them in the next pass, so that a spike of several points is removed
+    from its edge inwards. Without any height there the medians beside them were one-sided, and the tilt of a
+    smooth surface made two thirds of it spikes. The scale of the residual is that of the first pass.
     """
     # without this a slope would flag the points beside a missing one
     heights = detrended(heights, 1)[0]
     flagged = np.zeros(heights.shape, dtype=bool)
-    residual = np.abs(heights - _medians(heights, size))
+    medians = _medians(heights, size)
     # of a Gaussian, from a quantile; the median called a third of a coin and of heights of a few steps spikes
-    deviation = 0.6080 * float(np.nanquantile(residual, 0.9))
-    while deviation > 0 and (new := (residual > threshold * deviation) & ~flagged).any():
+    deviation = 0.6080 * float(np.nanquantile(np.abs(heights - medians), 0.9))
+    while deviation > 0 and (new := (np.abs(heights - medians) > threshold * deviation) & ~flagged).any():
         flagged |= new
-        residual = np.abs(heights - _medians(np.where(flagged, np.nan, heights), size))
+        medians = _medians(np.where(flagged, medians, heights), size)
     return flagged, deviation
 
 
