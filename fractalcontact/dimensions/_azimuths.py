@@ -18,11 +18,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from fractalcontact.base import fft
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import half_wavenumbers
 from fractalcontact.dimensions._gaussian_mixture import Bins, mixture, spread_nodes
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, MetricSpectrum, gaussian_tables
@@ -47,8 +47,6 @@ from fractalcontact.dimensions._spectral_posterior import (
     posterior,
 )
 from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 LARGEST = 2048  # points along each axis: 5 s of processor time and .8 GB
 LARGEST_SPACINGS = 32.0  # ratio of the spacings: images are summed as far along both axes

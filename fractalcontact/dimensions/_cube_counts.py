@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Scales, Surface, check_surface
 from fractalcontact.dimensions._windows import running_range, square_windows
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:

@@ -23,6 +23,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._methods import Method, function
@@ -35,8 +36,6 @@ from fractalcontact.dimensions._records import (
     undefined,
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface, between, check_surface, read_surfaces
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 ALWAYS = ("local_slope", "run_time")  # variables of every curve
 EXACT_MEAN = "exact to rounding: a mean over all pairs or windows, without its sampling scatter"

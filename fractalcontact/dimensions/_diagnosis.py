@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.dimensions._mode_bins import LEAST
 from fractalcontact.dimensions._surface_input import NOTABLE_SHARE, Surface
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # standard deviations of what no surface does by chance: 6.5 was the most of the lines of 5200 exact surfaces,
 # H .1 to .97, of 64 to 512 points a side; jumps of two rms increments have 8 or more, missing valleys of 2 to

@@ -12,6 +12,7 @@ import xarray as xr
 from fractalcontact.base.compass import check_directions, read_directions
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._azimuths import (
@@ -38,8 +39,6 @@ from fractalcontact.dimensions._surface_input import (
     read_surfaces,
 )
 from fractalcontact.dimensions._waves import without_waves
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along each axis
 _DIRECTIONS = 8

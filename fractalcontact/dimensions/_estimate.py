@@ -14,6 +14,7 @@ import xarray as xr
 
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.study import joined_references
@@ -32,8 +33,6 @@ from fractalcontact.dimensions._surface_input import (
     read_scales,
     read_surfaces,
 )
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _FIELDS = (
     "hurst",

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
@@ -19,8 +20,6 @@ from fractalcontact.dimensions._mode_fit import first_fit
 from fractalcontact.dimensions._records import NORMAL
 from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD
 from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _MOST_MISSING = 0.5  # share of the heights
 _LEAST_MODES, _LEAST_BINS = 12, 2  # of an octave

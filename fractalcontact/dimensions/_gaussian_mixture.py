@@ -18,14 +18,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
 from fractalcontact.base import fft
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
 
 HIGHEST = 12  # log2 of the largest t: beyond, a Gaussian is white on the lattice, the sum a geometric series
 # how heights were sampled: blurred before; blurred afterwards, by Gaussian weights of the neighbours; without
@@ -78,6 +76,12 @@ def weights(
     rest = series[..., -1:] / (1.0 - 2.0 ** -(h + falls))
     last = series[..., :-1].sum(axis=-1, keepdims=True) + rest
     return np.asarray(0.5 * np.where(np.arange(t.size) < t.size - 1, weight, weight * last) / unit)
+
+
+def log_bend(lnq: Array | float, hurst: float, corner: float, long_hurst: float, sharpness: float) -> Array:
+    """Return the logarithm of the factor of a corner, at logarithms of wavenumbers."""
+    bend = np.logaddexp(0.0, 2.0 * sharpness * (math.log(corner) - lnq))
+    return np.asarray((long_hurst - hurst) / sharpness * bend)
 
 
 @lru_cache
@@ -291,10 +295,9 @@ class Bins:
         bent = np.flatnonzero(theta[:, 3] > 0.0)
         unaliased = shares[bent] @ self._unaliased_logs.reshape(-1, bins)[nodes[bent]] - values[bent]
         factor, of_bend, of_share = self._bend(theta[bent], np.exp(np.minimum(unaliased[:, 0], 0.0)))
-        surface = values[:, 0].copy()
-        surface[bent] += factor
+        values[bent, 0] += factor
         values[bent, 1:] += of_share[:, None] * unaliased[:, 1:]
-        power, white = np.exp(np.maximum(surface, -600.0)), np.square(noise) * self.white  # not zero
+        power, white = np.exp(np.maximum(values[:, 0], -600.0)), np.square(noise) * self.white  # not zero
         total = power + white
         amplitude = 2.0 * np.log(self.noise / noise) if self.noise > 0.0 else 0.0
         found = np.zeros((theta.shape[0], 6 if slopes else 0, bins))

@@ -25,6 +25,7 @@ import xarray as xr
 from fractalcontact.base import fft
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -66,8 +67,6 @@ from fractalcontact.dimensions._surface_input import (
     read_surfaces,
 )
 from fractalcontact.dimensions._waves import LARGEST_CROP, without_waves
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along the edge of a window
 FEWEST = 25  # observed points in a window

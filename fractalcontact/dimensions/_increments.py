@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from fractalcontact.base import fft
-from fractalcontact.base.numbers import power_of_two
+from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.dimensions._curve import NO_NOISE, chi_square_z, misfit_reason
 from fractalcontact.dimensions._records import (
     CONSTANT,
@@ -34,8 +34,6 @@ from fractalcontact.dimensions._records import (
     undefined,
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # first differences where the pilot estimate is below, second differences above: their standard errors are
 # equal at H = 0.53 on 256 x 256 points and 0.43 on 1024 x 1024

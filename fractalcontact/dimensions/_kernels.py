@@ -5,13 +5,10 @@ They are imported inside the functions that call them: a study that needs no loo
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from fractalcontact.base.jit import gap_sum_kernel, kernel
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
 
 
 @gap_sum_kernel

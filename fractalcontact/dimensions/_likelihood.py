@@ -15,10 +15,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.units import quantity_text
 from fractalcontact.dimensions._azimuths import NO_METRIC, fit_azimuths
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
@@ -38,8 +38,6 @@ from fractalcontact.dimensions._spectral_posterior import (
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._waves import without_waves
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free: the interval is for "

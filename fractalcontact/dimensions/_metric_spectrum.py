@@ -14,11 +14,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.dimensions._gaussian_mixture import (
     ALIASED,
     FADED,
@@ -26,11 +26,10 @@ from fractalcontact.dimensions._gaussian_mixture import (
     LN_ALIAS,
     UNALIASED,
     AxisBlur,
+    log_bend,
 )
 from fractalcontact.dimensions._mode_bins import block_product
 from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, LONG_HURST, NOISE, SHARPNESS, SPREAD
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # of the interpolation, and images each way over those summed one by one: density of a ratio of 4 to .1 %, of
 # 8 to 2 %
@@ -104,20 +103,15 @@ class MetricSpectrum:
             total += block_product(along_y.T, along_x) if is_grid else (along_y * along_x).sum(axis=0)
         if self.theta[CORNER] > 0.0:
             own = replace(self, form=UNALIASED)._near_images(y, x)
-            aliases = (total - own) * self._bend(LN_ALIAS)
-            total = own * self._bend(0.5 * np.log(np.maximum(y * y + x * x, 1e-30))) + aliases
+            bend = self.theta[[HURST, CORNER, LONG_HURST, SHARPNESS]]
+            lnq = 0.5 * np.log(np.maximum(y * y + x * x, 1e-30))
+            total = own * np.exp(log_bend(lnq, *bend)) + (total - own) * np.exp(log_bend(LN_ALIAS, *bend))
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):
                 total *= np.square(AxisBlur(q.ravel()).transfers(s)[1].reshape(q.shape))
         gammas = math.gamma(1.0 + hurst) / math.gamma(1.0 - hurst)
         total *= 2.0 ** (2.0 * hurst + 1.0) * np.pi * hurst * gammas / self.dy
         return np.asarray(np.maximum(total, 1e-300))
-
-    def _bend(self, lnq: Array | float) -> Array:
-        """Return the factor of the corner at the logarithm of a wavenumber."""
-        hurst, long_hurst, sharpness = self.theta[[HURST, LONG_HURST, SHARPNESS]]
-        bend = np.logaddexp(0.0, 2.0 * sharpness * (np.log(self.theta[CORNER]) - lnq))
-        return np.asarray(np.exp((long_hurst - hurst) / sharpness * bend))
 
     def _near_images(self, y: Array, x: Array) -> Array:
         """Return the sum of the nearest images."""

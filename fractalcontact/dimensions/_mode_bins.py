@@ -15,15 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
-from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, spread_nodes, weights
-
-Array = np.ndarray[Any, np.dtype[Any]]
+from fractalcontact.base.numbers import Array
+from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, log_bend, spread_nodes, weights
 
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
@@ -52,8 +50,7 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
     power = block_product((rows * weight[:, None]).T, columns)
     np.maximum(power, 1e-300, out=power)
     if theta[3] > 0.0:
-        corner = 2.0 * theta[5] * np.log(theta[3] / lattice.q)
-        power *= np.exp((theta[4] - theta[0]) / theta[5] * np.logaddexp(0.0, corner))
+        power *= np.exp(log_bend(np.log(lattice.q), *theta[[0, 3, 4, 5]]))
     power += theta[2] ** 2
     return np.asarray(power)
 

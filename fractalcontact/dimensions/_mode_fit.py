@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import detrended
 from fractalcontact.base.spectra import window_weights
 from fractalcontact.dimensions._diagnosis import unevenness
@@ -41,8 +41,6 @@ from fractalcontact.dimensions._mode_bins import (
 from fractalcontact.dimensions._spectral_posterior import HURST, LOWEST, SPREAD, Known, posterior
 from fractalcontact.dimensions._surface_input import Surface, middle_slices
 from fractalcontact.dimensions._waves import LARGEST_CROP
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 # Log ratio of lengths up to which cosine modes serve under an oblique lay. With 1.5 to 1 (.41) intervals hold
 # H, with two to five times the error of the metric; with 2 to 1 at 15 degrees they miss H = .8 by .34. The

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import random_effects
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import NONE, Problems, Words
@@ -16,8 +17,6 @@ from fractalcontact.dimensions._estimate import estimate
 from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._spectral_posterior import joint_interval
 from fractalcontact.dimensions._surface_input import read_surfaces
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SOURCE = (
     "Paule and Mandel, J. Res. Natl. Bur. Stand. 87 (1982) 377-385; "

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.dimensions._curve import EXACT_MEAN, Curve, curve_dataset, no_profile, surface_check
 from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @public_result(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.dimensions._curve import (
     EXACT_MEAN,
@@ -21,8 +21,6 @@ from fractalcontact.dimensions._curve import (
 from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 from fractalcontact.dimensions._windows import square_windows
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @public_result(

@@ -35,13 +35,12 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.dimensions._gaussian_mixture import FILTERED, FORMS, UNALIASED, Bins
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
 LOWEST, HIGHEST = 0.005, 0.995  # H: at 0 and 1 no sum of Gaussians has increments

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import detrended, logarithm
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -25,7 +25,6 @@ from fractalcontact.dimensions._surface_input import (
     read_surfaces,
 )
 
-Array = np.ndarray[Any, np.dtype[Any]]
 _ROUNDING = (
     2.0**-100
 )  # of the largest power: the square of the rounding of a height, 2^-53, with a margin of 64

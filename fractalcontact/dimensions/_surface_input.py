@@ -12,11 +12,10 @@ import xarray as xr
 
 from fractalcontact.base.grid import Grid, read_grid
 from fractalcontact.base.labelled import check_leading
-from fractalcontact.base.numbers import power_of_two
+from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.validation import Problems
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Scales = tuple[float, float] | None
 
 ROUNDING = 1e-12  # of the range of heights
@@ -324,7 +323,4 @@ def middle_slices(shape: Iterable[int], edge: int) -> tuple[slice, ...]:
 
 
 def _height_range(heights: Array) -> tuple[float, float]:
-    low, high = float(heights.min()), float(heights.max())
-    if np.isnan(low):
-        low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
-    return low, high
+    return float(np.nanmin(heights)), float(np.nanmax(heights))

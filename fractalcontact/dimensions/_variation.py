@@ -8,14 +8,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import core_dims, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Scales, Surface, check_surface
 from fractalcontact.dimensions._windows import edge_lengths, running_range, square_windows
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def _check(problems: Problems) -> None:

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.grid import read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
 from fractalcontact.dimensions._methods import METHODS
 from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SQUARE, ABSOLUTE, SECOND = 0, 1, 2  # measures of an increment, see `_kernels.pair_sums`
 _FEW = 64  # lag vectors up to which direct sums are faster than transforms

@@ -20,12 +20,11 @@ import xarray as xr
 
 from fractalcontact.base import fft
 from fractalcontact.base.labelled import leading_coords
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, middle_slices, read_surfaces
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from fractalcontact.base.numbers import Array
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 def square_windows(

@@ -16,10 +16,9 @@ import xarray as xr
 
 from fractalcontact.base.errors import require_library
 from fractalcontact.base.files import written_whole
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import units_of
 from fractalcontact.base.validation import Problems, Words, writing
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _File = tuple[str, Callable[[Path], None]]  # its name, and what writes it
 

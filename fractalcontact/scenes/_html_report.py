@@ -22,7 +22,7 @@ import xarray as xr
 from fractalcontact.base.files import written_whole
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.netcdf import open as open_result
-from fractalcontact.base.numbers import spread_indices
+from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CORE_DIMS
@@ -45,8 +45,6 @@ from fractalcontact.scenes._results_folder import REPORT, SCANS, is_report, page
 from fractalcontact.scenes._stages import STAGES
 from fractalcontact.scenes._summary import Summary, summary_of, written_rows
 from fractalcontact.scenes._template import packaged_template
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 WHERE = "fractalcontact.scenes.report"
 FLAG_COLOURS = {

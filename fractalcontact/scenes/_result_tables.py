@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import spread_indices
+from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.base.schema import units_of
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
 
-Array = np.ndarray[Any, np.dtype[Any]]
 Remarks = Callable[[xr.DataTree, xr.Dataset], Iterable[str]]
 
 SCAN = "scan"  # the dim of many scans

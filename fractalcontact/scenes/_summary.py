@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.file_contents import stage_rows
 from fractalcontact.base.grid import EXCESS_PER_EDGE, read_grid
+from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of, member_count, of_member, scene_of
 from fractalcontact.base.tables import note, table
@@ -19,8 +20,6 @@ from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
 from fractalcontact.scenes._stages import STAGES
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 Rule = Callable[[xr.DataTree], Iterator[str]]
 PRESSED = {"contact": "the surface", "joints/closure": "the delta-surface"}
