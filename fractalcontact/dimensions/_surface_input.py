@@ -55,8 +55,8 @@ class Surface:
         """Scaled heights, shape (ny, nx); ny = 1 for a profile. NaN where nothing was observed."""
         if self._heights is None:
             raw = self.raw
-            low, high = _height_range(raw)
-            self._unit = power_of_two(high - low)
+            low = float(np.nanmin(raw))
+            self._unit = power_of_two(float(np.nanmax(raw)) - low)
             self._heights = raw - low
             self._heights *= 1.0 / self._unit
         return self._heights
@@ -320,7 +320,3 @@ def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) ->
 def middle_slices(shape: Iterable[int], edge: int) -> tuple[slice, ...]:
     """Return the slices of the middle `edge` points along each axis, or of all where there are fewer."""
     return tuple(slice(max(0, n - edge) // 2, (n + edge) // 2) for n in shape)
-
-
-def _height_range(heights: Array) -> tuple[float, float]:
-    return float(np.nanmin(heights)), float(np.nanmax(heights))
