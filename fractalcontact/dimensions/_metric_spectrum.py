@@ -12,7 +12,7 @@ function of q, is interpolated.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -23,7 +23,6 @@ from fractalcontact.dimensions._gaussian_mixture import (
     ALIASED,
     FADED,
     FILTERED,
-    LN_ALIAS,
     UNALIASED,
     AxisBlur,
     log_bend,
@@ -101,17 +100,17 @@ class MetricSpectrum:
             along_y, along_x = (chebvander(q.ravel() / np.pi, _NODES - 1).T for q in (y * self.dy, x))
             along_y = self._far_images.T @ along_y
             total += block_product(along_y.T, along_x) if is_grid else (along_y * along_x).sum(axis=0)
-        if self.theta[CORNER] > 0.0:
-            own = replace(self, form=UNALIASED)._near_images(y, x)
-            bend = self.theta[[HURST, CORNER, LONG_HURST, SHARPNESS]]
-            lnq = 0.5 * np.log(np.maximum(y * y + x * x, 1e-30))
-            total = own * np.exp(log_bend(lnq, *bend)) + (total - own) * np.exp(log_bend(LN_ALIAS, *bend))
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):
                 total *= np.square(AxisBlur(q.ravel()).transfers(s)[1].reshape(q.shape))
         gammas = math.gamma(1.0 + hurst) / math.gamma(1.0 - hurst)
         total *= 2.0 ** (2.0 * hurst + 1.0) * np.pi * hurst * gammas / self.dy
         return np.asarray(np.maximum(total, 1e-300))
+
+    def _log_bend(self, squares: Array) -> Array:
+        """Return the logarithm of the factor of the corner at squared wavenumbers."""
+        lnq = 0.5 * np.log(np.maximum(squares, 1e-30))
+        return log_bend(lnq, *self.theta[[HURST, CORNER, LONG_HURST, SHARPNESS]])
 
     def _near_images(self, y: Array, x: Array) -> Array:
         """Return the sum of the nearest images."""
@@ -123,6 +122,8 @@ class MetricSpectrum:
         density *= -1.0 - float(self.theta[HURST])
         if self.theta[SPREAD] > 0.0 and self.form != FILTERED:
             density -= self.theta[SPREAD] ** 2 * (qy * qy + qx * qx)
+        if self.theta[CORNER] > 0.0:
+            density += self._log_bend(qy * qy + qx * qx)
         return np.asarray(np.exp(density, out=density).sum(axis=(0, 1)))
 
     def with_noise(self, y: Array, x: Array) -> Array:
@@ -138,6 +139,8 @@ class MetricSpectrum:
         images = squared_length(self.inverse, y, x) ** (-1.0 - hurst) * blur
         by_azimuth = squared_length(self.inverse, sine, cosine) ** (-1.0 - hurst)
         beyond = np.mean(by_azimuth * radial) * (self.dy / (4.0 * np.pi * hurst))
+        if self.theta[CORNER] > 0.0:
+            images = images * np.exp(self._log_bend(y * y + x * x))
         return np.asarray(polynomials @ (images.sum(axis=2) + beyond) @ polynomials.T)
 
 
