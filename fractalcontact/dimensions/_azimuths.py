@@ -24,7 +24,7 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import half_wavenumbers
-from fractalcontact.dimensions._gaussian_mixture import Bins, mixture, spread_nodes
+from fractalcontact.dimensions._gaussian_mixture import Bins, alias_logs, mixture, spread_nodes
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, MetricSpectrum, gaussian_tables
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
@@ -303,12 +303,15 @@ class Classes:
         logs, variance = self._logs
         total = np.bincount(self.ring, 1.0 / variance)
         share = 1.0 / (variance * total[self.ring])
-        weight = np.repeat(share / self.size, self.size) / self._before
+        even = np.repeat(share / self.size, self.size)
+        weight = even / self._before
         starts = self.first[np.flatnonzero(np.diff(self.ring, prepend=-1))]
         tables = gaussian_tables(t, spreads, spectrum, *self.sample, weight, starts)
         lnq = self.by_ring(self.lnq, self.count)
-        level = self.by_ring(logs, share)
-        return Bins(level, 1.0 / total, tables, nodes, t, np.add.reduceat(weight, starts), lnq, extent, 2)
+        level, white = self.by_ring(logs, share), np.add.reduceat(weight, starts)
+        ln_alias = np.add.reduceat(even * alias_logs(*self.sample, modes.dy, 2), starts)
+        finest = min(1.0, modes.dy)
+        return Bins(level, 1.0 / total, tables, nodes, t, white, lnq, ln_alias, extent, finest, 2)
 
     def along(self, spectrum: MetricSpectrum, azimuths: Array) -> Array:
         """Fit amplitude and exponent to all waves, and to those about azimuths (degree).

@@ -31,7 +31,6 @@ HIGHEST = 12  # log2 of the largest t: beyond, a Gaussian is white on the lattic
 FORMS = 3
 ALIASED, FILTERED, UNALIASED = range(FORMS)
 _SUM_OF_WAVES = 1.0  # spread from which on the sum over waves is the shorter one, exact to 3e-7
-LN_ALIAS = math.log(2.0 * np.pi)  # of the wavenumber that stands for aliases: of waves of one spacing
 # ln(H / (1 - H)) of the exponents of a table; between them the logarithms of bins are off by less than 1e-4
 _LOGITS = np.linspace(-5.3, 5.3, 43)
 # of the cubics that are one at -1, 0, 1 or 2, and zero at the others: coefficients of the powers, by column
@@ -94,6 +93,19 @@ def _point_weights(spread: float) -> Array:
     variances = weights @ np.square(u) / (weights.sum(axis=1) - 0.5)
     width = np.interp(spread, np.sqrt(variances), widths)
     return np.asarray(np.exp(-0.5 * np.square(u[1:] / width)))
+
+
+def alias_logs(y: Array, x: Array, dy: float, axes: int) -> Array:
+    """Return the mean logarithm of the wavenumbers of the nearest aliases of waves, weighted by their power
+    q^(-1 - axes).
+
+    Wavenumbers are in radians per x spacing; `dy` is the other spacing.
+    """
+    down, across = 2.0 * np.pi * np.mgrid[1 - axes : axes, -1:2].reshape(2, -1, 1)
+    squares = np.square(y + down / dy) + np.square(x + across)
+    aliases = np.delete(squares, len(squares) // 2, axis=0)
+    power = aliases ** (-0.5 * (1.0 + axes))
+    return np.asarray(0.5 * (power * np.log(aliases)).sum(axis=0) / power.sum(axis=0))
 
 
 class AxisBlur:
@@ -191,8 +203,10 @@ class Bins:
         Mean of 1 / pilot.
     lnq : ndarray, shape (bins,)
         Mean logarithm of the wavenumber, radians per x spacing.
-    extent : float
-        Of the longer edge, in x spacings.
+    ln_alias : ndarray, shape (bins,)
+        The same of aliases, see `alias_logs`.
+    extent, finest : float
+        Of the longer edge, and the smaller spacing, in x spacings.
     axes : int
     noise : float
         Rms height of white noise, if it is known: the amplitude of the surface is then this over the noise
@@ -206,7 +220,9 @@ class Bins:
     t: Array
     white: Array
     lnq: Array
+    ln_alias: Array
     extent: float
+    finest: float
     axes: int
     noise: float = 0.0
 
@@ -239,14 +255,14 @@ class Bins:
         """Return the logarithm of the factor of a corner, (points, bins), and its derivatives.
 
         They are those by theta, see `log_power`, and by the logarithm of `share`, that of the waves longer
-        than two points. The rest are aliases, which have about the factor of waves of one spacing: power
-        of a Matern roll-off at 16 spacings (H = .2) and of a sum equal at a lag of 8 is then off by .0005 and
-        .0017 (rms, apart from its level), with the factor of the waves themselves by .0048 and .0106.
+        than two points. The rest are aliases, which have about the factor of their mean wave: power of a
+        Matern roll-off at 16 spacings (H = .2) is then off by .0009 (rms, apart from its level), with the
+        factor of the waves themselves by .0049; at 16 spacings of 1 and 4 by .006.
         """
         from scipy.special import expit
 
         hurst, _, _, corner, long_hurst, p = theta.T[:, :, None]
-        lnq = np.stack([self.lnq, np.full_like(self.lnq, LN_ALIAS)])[:, None]
+        lnq = np.stack([self.lnq, self.ln_alias])[:, None]
         x, difference = 2.0 * p * (np.log(corner) - lnq), long_hurst - hurst
         bend = np.logaddexp(0.0, x)
         powers = np.exp(difference / p * bend)
@@ -392,6 +408,11 @@ class Lattice:
     def shortest_edge(self) -> float:
         """Length of the shorter edge, in x spacings."""
         return min(n * d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
+
+    @property
+    def finest(self) -> float:
+        """Smaller of the spacings, in x spacings."""
+        return min(d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
 
     @property
     def steps(self) -> tuple[float, float]:

@@ -21,7 +21,15 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import Array
-from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, log_bend, spread_nodes, weights
+from fractalcontact.dimensions._gaussian_mixture import (
+    FORMS,
+    Bins,
+    Lattice,
+    alias_logs,
+    log_bend,
+    spread_nodes,
+    weights,
+)
 
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
@@ -256,6 +264,8 @@ def make_bins(
     bins, place = np.nonzero(chosen >= 0)[0], chosen[chosen >= 0]
     weight = 1.0 / (pilot.ravel()[place] * np.bincount(bins)[bins])
     rows, columns = np.divmod(place, pilot.shape[1])
+    y, x = lattice.wavenumbers
+    aliases = alias_logs(y[rows], x[columns], lattice.spacing[0], lattice.axes)
     ends = np.cumsum(np.bincount(bins))
     spreads, nodes = spread_nodes(lattice.shortest_edge, is_pilot=is_pilot)
     tables = np.zeros((FORMS, spreads.size, count.size, lattice.t.size))
@@ -272,7 +282,9 @@ def make_bins(
         t=lattice.t,
         white=np.bincount(bins, weight),
         lnq=lnq / count,
+        ln_alias=np.bincount(bins, aliases) / np.bincount(bins),
         extent=lattice.longest,
+        finest=lattice.finest,
         axes=lattice.axes,
     )
 

@@ -2,16 +2,17 @@
 
 The expected power of a bin b is
 
-    E_b = A { B(q) U_b + B(2 pi) (S_b - U_b) + nu^2 W_b },    S_b = sum_j w_j(H) M_bj(s, form),  (1)
+    E_b = A { B(q) U_b + B(q_a) (S_b - U_b) + nu^2 W_b },    S_b = sum_j w_j(H) M_bj(s, form),  (1)
     B(q) = (1 + (q_0 / q)^(2 p))^((H_2 - H) / p),    p = k |H_2 - H|
 
 with the Gaussians j of `_gaussian_mixture`. U is that part of S whose waves are longer than two points;
-the others, aliases, have about the bend of waves of one spacing. H is the exponent, s the spread of a
-blur, nu white noise over the rms increment, q_0 the wavenumber beyond which long waves have the exponent
-H_2, k the sharpness of that corner: 1 where two surfaces were added, 1 / (1 + H) of a Matern covariance,
-large of a sudden plateau. The amplitude A has a flat prior in ln A, or is (n / nu)^2 where the height n
-of the noise is known; the others have those of the constants below. Heights were sampled after the blur,
-before it, or without waves shorter than two points. The logarithms of the bins are normal, and
+the others, aliases, have about the bend at the mean wavenumber q_a of the nearest ones. H is the exponent,
+s the spread of a blur, nu white noise over the rms increment, q_0 the wavenumber beyond which long waves
+have the exponent H_2, k the sharpness of that corner: 1 where two surfaces were added, 1 / (1 + H) of a
+Matern covariance, large of a sudden plateau. The amplitude A has a flat prior in ln A, or is (n / nu)^2
+where the height n of the noise is known; the others have those of the constants below. Heights were
+sampled after the blur, before it, or without waves shorter than two points. The logarithms of the bins are
+normal, and
 
     y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
 
@@ -331,8 +332,8 @@ def posterior(
         kinds = [kind for kind in kinds if kind.inside.all()]
     if is_pilot:
         kinds = [kind for kind in kinds if kind.inside[0] and kind.scatter[0] in (0.0, _TAUS[2])]
-    # an octave of waves, of two to four spacings, is shorter than a corner, and shows H
-    corners = math.log(0.5 * np.pi / bins.extent), math.log(0.5 * np.pi)
+    # an octave of waves, of two to four of the smaller spacings, is shorter than a corner, and shows H
+    corners = math.log(0.5 * np.pi / bins.extent), math.log(0.5 * np.pi / bins.finest)
     ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, _PRIOR_SHARPNESS
     prior = np.array(ranges).T
     whitening, constants = map(np.stack, zip(*(_whitening(kind, bins) for kind in kinds), strict=True))

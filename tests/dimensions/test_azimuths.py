@@ -14,6 +14,7 @@ from fractalcontact.dimensions._gaussian_mixture import (
     UNALIASED,
     AxisBlur,
     Bins,
+    alias_logs,
     mixture,
     spread_nodes,
     weights,
@@ -103,28 +104,32 @@ def test_densities_under_a_metric_are_sums_over_all_images(ratio, dy):
         assert np.abs(deviation - np.median(deviation)).max() < 2e-3
 
 
+@pytest.mark.parametrize(("dy", "largest"), [(0.25, 0.007), (1.0, 0.001), (4.0, 0.007)])
 @pytest.mark.parametrize("hurst", [0.2, 0.5, 0.8])
-def test_a_rolloff_leaves_the_aliases_of_its_waves(hurst):
+def test_a_rolloff_leaves_the_aliases_of_its_waves(hurst, dy, largest):
     """Spectrum and bins beside the sum over images of a Matern density.
 
-    Deviations were .005, .004 and .003 where aliases had the factor of the waves themselves.
+    Deviations were .005, .004 and .003 where aliases had the factor of the waves themselves, and up to .02
+    with spacings of 4 to 1 where they had that of waves of one spacing along x.
     """
-    theta = np.array([hurst, 0.0, 0.0, 2.0 * np.pi / 16.0, -1.0, 1.0])
+    theta = np.array([hurst, 0.0, 0.0, 2.0 * np.pi / 16.0 * max(1.0, 1.0 / dy), -1.0, 1.0])
     q, azimuth = np.geomspace(0.1, 3.1, 60), np.random.default_rng(2).uniform(-0.5 * np.pi, 0.5 * np.pi, 60)
-    y, x = q * np.sin(azimuth), q * np.cos(azimuth)
+    y, x = q * np.sin(azimuth) / dy, q * np.cos(azimuth)
     images = 2.0 * np.pi * np.arange(-200, 201)
-    squares = (y[:, None, None] + images[:, None]) ** 2 + (x[:, None, None] + images) ** 2
+    squares = (y[:, None, None] + images[:, None] / dy) ** 2 + (x[:, None, None] + images) ** 2
     plain = (squares + theta[3] ** 2) ** (-1.0 - hurst)
-    radius = 2.0 / np.sqrt(np.pi) * (images[-1] + np.pi)  # of the circle of the same area as all images
-    beyond = radius ** (-2.0 * hurst) / (4.0 * np.pi * hurst)
+    # the integral over all images beyond the rectangle
+    quarter = np.pi / 720.0 * (np.arange(360) + 0.5)
+    edge = (images[-1] + np.pi) / np.maximum(np.sin(quarter) * dy, np.cos(quarter))
+    beyond = np.mean(edge ** (-2.0 * hurst)) * dy / (4.0 * np.pi * hurst)
     expected = np.log(plain.sum(axis=(1, 2)) + beyond)
-    spectrum, t = MetricSpectrum(theta, ALIASED, np.zeros(2), 1.0), mixture(64.0)
+    spectrum, t = MetricSpectrum(theta, ALIASED, np.zeros(2), dy), mixture(64.0 * max(1.0, dy))
     spreads, nodes = spread_nodes(64.0, is_pilot=False)
     tables = gaussian_tables(t, spreads, spectrum, y, x, np.ones(y.size), np.arange(y.size))
-    lnq, unit = np.log(q), np.ones(y.size)
-    bins = Bins(expected, unit, tables, nodes, t, unit, lnq, 64.0, 2)
-    for found in (np.log(spectrum.at(y, x)), bins.log_power(theta[None], ALIASED)[0][0]):
-        assert np.std(found - expected) < 0.001
+    lnq, unit = 0.5 * np.log(y * y + x * x), np.ones(y.size)
+    bins = Bins(expected, unit, tables, nodes, t, unit, lnq, alias_logs(y, x, dy, 2), 64.0, min(1.0, dy), 2)
+    assert np.std(np.log(spectrum.at(y, x)) - expected) < 0.001
+    assert np.std(bins.log_power(theta[None], ALIASED)[0][0] - expected) < largest
 
 
 @pytest.mark.parametrize("form", [ALIASED, FILTERED, UNALIASED])

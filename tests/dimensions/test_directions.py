@@ -500,9 +500,9 @@ def test_white_noise_has_no_exponent_but_zero(n, seed):
     assert not (result["ci_low"] > 0.01).any()
 
 
-@pytest.mark.parametrize("seed", [17, 20])
+@pytest.mark.parametrize("seed", [16, 17, 18])
 def test_white_noise_without_a_lay_keeps_its_exponent(seed):
-    # where every surface had a lay, of some ratio, these had .33 and .31: noise without a lay was as probable
+    # where every surface had a lay, of some ratio, these had .37, .25 and .32: noise was as probable
     white = fc.surfaces.from_array(np.random.default_rng(seed).standard_normal((256, 256)), SPACING)
     assert (fc.dimensions.directions(white)["hurst"] < 0.1).all()
 

@@ -336,3 +336,17 @@ def test_a_corner_of_a_few_spacings_is_seen(hurst, corner):
         result = estimated(surface.values[:N, :N])
         held += bool(result.ci_low <= hurst <= result.ci_high)
     assert held >= 3
+
+
+def test_a_corner_beside_unequal_spacings_is_the_same_along_either_axis():
+    """Spacings of 1 and 4 along x: exponents were .92 and .39, corners, of 8, were at 8 and 17."""
+    fine = fc.surfaces.spectral((1024, 1024), 0.5, hurst=0.5, rms_height=1.0, rolloff=8.0, rng=0).values
+    heights = fine[:512:8, :512:2]
+    found = [
+        fc.dimensions.estimate(fc.surfaces.from_array(z, spacing)).isel(method=0)
+        for z, spacing in ((heights, (4.0, 1.0)), (heights.T.copy(), (1.0, 4.0)))
+    ]
+    assert float(found[1].hurst) == pytest.approx(float(found[0].hurst), abs=0.02)
+    for each in found:
+        length = float(str(each.note.values).split("waves longer than about ")[1].split(" m")[0])
+        assert length == pytest.approx(8.0, rel=0.05)
