@@ -141,7 +141,8 @@ def radial_average(
     nyquist = np.pi / max(spacing)
     edges = ring_edges(shape, spacing) if edges is None else np.asarray(edges, dtype=np.float64)
     rings = edges.size - 1
-    ring = np.searchsorted(edges, radius, side="right")  # 0 and rings + 1 hold what is in no ring
+    # 0 and rings + 1 hold what is in no ring; rounding, as of metres, must not move modes on an edge
+    ring = np.searchsorted(edges * (1 - 1e-12), radius, side="right")
     ring[(radius > nyquist * (1 + 1e-12)) | (radius == 0)] = 0
 
     def sums(weights: Array) -> Array:

@@ -197,7 +197,7 @@ def band_curve(surface: Surface, window: Scales) -> Curve:
         return rings
     octaves = float(np.log2(rings.scale[-1] / rings.scale[0]))
     number = max(2, round(2.0 * octaves))
-    band = np.log2(rings.scale / rings.scale[0]) * (number / max(octaves, 1e-9))
+    band = np.log2(rings.scale / rings.scale[0]) * (number / max(octaves, 1e-9)) + 1e-9
     modes = np.where(np.minimum(band.astype(int), number - 1) == np.arange(number)[:, None], rings.count, 0)
     modes = modes[modes.any(axis=1)]
     count = modes.sum(axis=1)

@@ -98,3 +98,14 @@ def test_a_wave_along_a_periodic_axis_keeps_its_power(shift):
     curve = fc.dimensions.spectrum(surface_of(heights, periodic=(True, False)), taper=None)
     total = float((curve.power_spectral_density * curve.mode_count).sum()) / (32 * 64 * 1e-6)
     assert total == pytest.approx(0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(128, 96), (120, 90)])
+def test_the_exponent_does_not_depend_on_the_unit_of_length(shape):
+    """Modes on an edge of a ring fell to either side by rounding: H was .31 or .34, and .20 or .23."""
+    heights = np.random.default_rng(0).standard_normal(shape).cumsum(axis=0).cumsum(axis=1)
+    found = [
+        fc.dimensions.estimate(fc.surfaces.from_array(heights * unit, 1e-5 * unit), "spectrum").hurst.item()
+        for unit in (1.0, 7e-5, 1e9)
+    ]
+    assert found == pytest.approx([found[0]] * 3, rel=1e-7)
