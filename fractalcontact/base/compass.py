@@ -72,6 +72,11 @@ def read_direction(value: str | float) -> Direction:
     return Direction(names.get(azimuth, f"{azimuth:g}"), azimuth, unit)
 
 
+def direction_text(name: Any) -> str:
+    """Return the name of a direction as text: that of an azimuth has its unit, `37.5°`."""
+    return str(name) if str(name).isalpha() or not str(name) else f"{name}°"
+
+
 def is_single(value: Any) -> bool:
     """Return whether one direction is meant, not a sequence of them."""
     return isinstance(value, (str, bytes, dict)) or not np.iterable(value)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import direction_text
 from fractalcontact.base.numbers import ROUNDED, spread_indices
 from fractalcontact.base.study import provenance_of, stated_argument
 from fractalcontact.base.validation import NONE, Problems, require
@@ -261,7 +262,7 @@ def direction_style(name: str, number: int) -> dict[str, Any]:
 
 def direction_name(name: str) -> str:
     """Return the printed name of a direction: `East` for E, `30°` for an azimuth."""
-    return NAMES.get(name, name if not name or name.isalpha() else f"{name}°")
+    return NAMES.get(name, direction_text(name))
 
 
 def evenly_sampled_reach(data: xr.Dataset, jump: float = 4.0) -> float:

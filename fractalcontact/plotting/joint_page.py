@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import direction_text, read_directions
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.study import group_of, provenance_of
 from fractalcontact.base.units import Scale, quantity_text
@@ -135,7 +136,8 @@ def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
             shown = ", ".join(quantity_text(float(v), units) if units else f"{float(v):g}" for v in values)
             texts.append(f"{symbol} {shown}{'°' if key.endswith('angle') else ''}")
     if "direction" in stated:
-        texts.append(f"shear towards {stated['direction']}")
+        names = [direction_text(direction.name) for direction in read_directions(stated["direction"])]
+        texts.append(f"shear towards {', '.join(names)}")
     if texts:
         yield "assumed: " + "; ".join(texts)
 

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import direction_text
 from fractalcontact.base.study import group_of, provenance_of
 from fractalcontact.base.units import fixed, jrc_text
 from fractalcontact.scenes._result_tables import length
@@ -53,11 +54,12 @@ def _without_spikes(tree: xr.DataTree, clean: xr.DataArray) -> Iterator[str]:
         if not abs(after - before) <= 0.01:
             yield f"D is {fixed(after, 2)}, not {fixed(before, 2)}"
     if jrc is not None:
-        direction = [str(name) for name in np.atleast_1d(jrc["direction"].values)]
-        measured = public_function("joints.roughness_coefficient")(clean, direction=direction)
+        stated = provenance_of(jrc)["parameters"]
+        settings = {key: stated[key] for key in ("direction", "regression", "lag", "length") if key in stated}
+        measured = public_function("joints.roughness_coefficient")(clean, **settings)
         new, old = (np.atleast_1d(each["roughness_coefficient"].values) for each in (measured, jrc))
         texts = ([jrc_text(value, 0) for value in values] for values in (new, old))
-        rows = zip(*texts, direction, strict=True)
+        rows = zip(*texts, map(direction_text, np.atleast_1d(jrc["direction"].values)), strict=True)
         words = [f"{one}, not {other}, toward {name}" for one, other, name in rows if one != other]
         if words and np.max(np.abs(new - old)) > 0.5:  # a fortieth of the scale
             yield f"JRC is {', '.join(words)}"

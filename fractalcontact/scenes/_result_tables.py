@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.compass import direction_text
 from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.base.schema import units_of
 from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
@@ -170,7 +171,7 @@ def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
         return ""
     value = state[dim]
     if value.dtype.kind not in "fiu":
-        return str(value.values)
+        return direction_text(value.values) if dim == "direction" else str(value.values)
     return amount(value, scale=scale_for(units_of(value.name, value.attrs), data[dim].values))
 
 

@@ -50,6 +50,27 @@ def test_root_of_a_file_states_the_main_results(tmp_path):
         assert "contacts are not resolved" in root.caveats
 
 
+def test_jrc_without_spikes_is_that_of_the_wanted_call(tmp_path):
+    """Along an azimuth, and with another regression, which gives another JRC of the same profiles."""
+    scan = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=2e-5, rng=5)
+    scan.values[[11, 30], [17, 42]] += 2e-3
+    fc.save(scan, tmp_path / "scan.nc")
+    options = {"direction": [37.5, "N"], "regression": "yu_vayssade", "lag": 5e-4}
+    text = '[surface]\nread = "scan.nc"\n[joint.roughness_coefficient]\n'
+    text += 'direction = [37.5, "N"]\nregression = "yu_vayssade"\nlag = 5e-4\n'
+    text += '[want]\nsurfaces = ["height"]\njoints = ["roughness_coefficient"]\n'
+    tree = fc.scenes.run(scene(tmp_path, text), progress=False)
+    pair = (
+        fc.joints.roughness_coefficient(surface, **options).roughness_coefficient.values
+        for surface in (fc.surfaces.despike(scan), scan)
+    )
+    words = [
+        f"{new:.0f}, not {old:.0f}, toward {name}"
+        for new, old, name in zip(*pair, ("37.5°", "N"), strict=True)
+    ]
+    assert f"JRC is {', '.join(words)} (--despike)" in " ".join(tree.attrs["spikes"].split())
+
+
 def test_summary_and_report_of_a_file_compute_nothing(tmp_path, monkeypatch):
     """The file has what the run compared: the scan without spikes, another form of friction."""
     scan = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=2e-5, rng=5)

@@ -321,9 +321,9 @@ def test_many_rows_are_thinned_to_fit_the_screen(monkeypatch):
     text = fc.scenes.summary(tree)
     assert len(text.splitlines()) <= 36
     assert "of 30)" in text
-    assert {"E", "290"} <= {line.split()[0] for line in text.splitlines() if line}
+    assert {"E", "290°"} <= {line.split()[0] for line in text.splitlines() if line}
     whole = fc.scenes.summary(tree, verbose=True)
-    numbers = {f"{10 * k}" for k in range(30) if k % 9}  # the others are compass directions
+    numbers = {f"{10 * k}°" for k in range(30) if k % 9}  # the others are compass directions
     assert numbers <= {line.split()[0] for line in whole.splitlines() if line}
 
 
