@@ -22,6 +22,7 @@ from fractalcontact.base import fft
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.results import public_result
+from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, middle_slices, read_surfaces
@@ -161,8 +162,8 @@ def _name(members: Sequence[Wave]) -> str:
     first = members[0]
     others = f" and {len(members) - 1} of its multiples" if len(members) > 1 else ""
     return (
-        f"{first.wavelength:.3g} m at {first.azimuth:.0f} degrees with the amplitude "
-        f"{first.amplitude:.2g} m{others}"
+        f"{quantity_text(first.wavelength, 'm')} at {round(first.azimuth) % 180} degrees with the amplitude "
+        f"{quantity_text(first.amplitude, 'm', 2)}{others}"
     )
 
 

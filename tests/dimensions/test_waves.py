@@ -250,7 +250,16 @@ def test_fifth_of_an_increment_is_found_named_and_excluded(seeds):
         assert found.wave_amplitude.values / STEP == pytest.approx([0.2], rel=0.2)
         alone, removed = (fc.dimensions.estimate(each) for each in (surface, marked))
         assert float(removed.hurst[0]) == pytest.approx(float(alone.hurst[0]), abs=4e-4)
-        assert re.search(r"a single wave removed: 5\.[23]\d?e-05 m at", str(removed.note.values))
+        assert re.search(r"a single wave removed: 5[23]\.?\d? µm at", str(removed.note.values))
+
+
+def test_note_has_the_units_of_the_other_notes():
+    """A wave along x; its azimuth is 0 or 180 degrees, whichever rounding gives."""
+    heights = 2e-6 * np.sin(2 * np.pi * np.arange(200) / 20) + np.random.default_rng(1).normal(
+        0, 5e-8, (200, 200)
+    )
+    note = str(fc.dimensions.estimate(fc.surfaces.from_array(heights, 5e-6)).note.values)
+    assert "a single wave removed: 100 µm at 0 degrees with the amplitude 2 µm" in note
 
 
 def test_multiples_and_crossed_marks():
@@ -277,7 +286,7 @@ def test_sawtooth_is_named_with_its_multiples(seeds):
         sawtooth = surface + (2.0 * STEP * (2.0 * ((along + 0.3) % 1.0) - 1.0)).transpose("y", "x")
         alone, removed = (fc.dimensions.estimate(each) for each in (surface, sawtooth))
         comment = str(removed.note.values)
-        named = re.search(r"removed: 0.00013[67] m at (\d+) degrees .*? and (\d+) of its", comment)
+        named = re.search(r"removed: 13[67] µm at (\d+) degrees .*? and (\d+) of its", comment)
         assert abs(int(named[1]) - np.degrees(angle)) <= 1.0
         assert int(named[2]) >= 8
         errors.append(float(removed.hurst[0] - alone.hurst[0]))
