@@ -30,7 +30,7 @@ UNRESOLVED = "NaN where the shears do not resolve the distance: a step of shear 
 PEAKS = ("peak_friction_angle", "peak_shear_strength", "secant_friction_angle", "secant_shear_strength")
 PEAK_SHEARS = ("peak_shear", "peak_strength_shear")
 NOT_KNOWN = (
-    "depends on the distance in a way that is not known: no half of it is resolved there, or faces lock"
+    "depends on the distance in a way that is not known: half of it is not resolved, or the faces lock"
 )
 ENERGIES = ["normal_force", "bulk_closure", "elastic_energy"]
 PEAK_SHARE = 0.01  # shear at peak strength over the length of a joint, commonly (Barton and Choubey 1977)
