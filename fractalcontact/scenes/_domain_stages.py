@@ -86,10 +86,10 @@ def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     ends = zip(*(data[name].values.ravel() for name in ("window_low", "window_high")), strict=True)
     for low, high in dict.fromkeys((length(low), length(high)) for low, high in ends if np.isfinite(low)):
         yield f"D is over {low} to {high}, beside that of random spots; clustering and patches at {high}."
-    reasons = sorted({str(reason) for reason in data["reason"].values.ravel() if reason})
+    reasons = [str(reason) for reason in data["reason"].values.ravel() if reason]
     if reasons:
-        count = int((data["signature_flag"] > 0).sum())
-        yield f"{count} of {data['signature_flag'].size} states have no dimension, as {reasons[0]}."
+        of_which = "" if len(set(reasons)) == 1 else "; the last of them"
+        yield f"{len(reasons)} of {data['reason'].size} states have no dimension{of_which}: {reasons[-1]}."
 
 
 SIGNATURE = "domains/signature"

@@ -417,6 +417,17 @@ def test_zero_lengths_have_a_unit_of_their_size():
     assert rows(tree, "peak shear strength")[0]["from shear"] == "0 mm"
 
 
+def test_reason_of_states_without_a_dimension_belongs_to_one_of_them():
+    masks = np.zeros((2, 64, 64), bool)
+    masks[0, 5, 5], masks[1, ::16, ::16] = True, True
+    coords = {"y": np.arange(64) * 1e-4, "x": np.arange(64) * 1e-4}
+    signature = fc.domains.signature(xr.DataArray(masks, coords, ("step", "y", "x")))
+    words = remarks(xr.DataTree.from_dict({"domains/signature": signature}))
+    assert f"2 of 2 states have no dimension; the last of them: {signature.reason.values[1]}." in words
+    words = remarks(xr.DataTree.from_dict({"domains/signature": signature.isel(step=[0, 0])}))
+    assert f"2 of 2 states have no dimension: {signature.reason.values[0]}." in words
+
+
 def test_numbers_of_caveats_have_no_exponents():
     surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
     pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
