@@ -54,7 +54,7 @@ def test_words_are_those_of_the_results(tree):
     shown = texts(figure_of(fc.scenes.datasheet(tree)))
     for expected in (
         "Joint under the spillway",
-        "contacts are not resolved at every load",
+        "contacts are not resolved at any load",
         "direct shear: one hardness",
         "face of 24 mm x 24 mm, heights 0.5 mm apart, mated copy above; block of 16 mm x 16 mm",
         "assumed: E 30 GPa; ν 0.2; φb 30°; JCS 60 MPa; hardness 60 MPa; shear towards E",
