@@ -279,12 +279,14 @@ def _over_members(
         return text(float(known[0])) + unit + share
     spread = float(np.std(known, ddof=1))
     digits, sign = decimals(spread), text(float(known.mean())).startswith("+")
-    return f"{fixed(float(known.mean()), digits, sign=sign)} ± {fixed(spread, digits)}{unit}{share}"
+    mean, spread = (round(value, digits) for value in (float(known.mean()), spread))
+    shown = max(digits, 0)  # 18 700 ± 2100 has its last digits in front of the point
+    return f"{fixed(mean, shown, sign=sign)} ± {fixed(spread, shown)}{unit}{share}"
 
 
 def _decimals_of(spread: float) -> int:
-    """Return the decimals that show a standard deviation with two digits."""
-    return max(0, 1 - int(np.floor(np.log10(spread))))
+    """Return the decimals that show a standard deviation with two digits; -2 where they are hundreds."""
+    return 1 - int(np.floor(np.log10(spread)))
 
 
 def at_value(name: str, dim: str, value: Any) -> Any:

@@ -9,7 +9,8 @@ from study import SOUND, command_here
 
 import fractalcontact as fc
 from fractalcontact.base.file_contents import file_contents
-from fractalcontact.base.units import quantity_text
+from fractalcontact.base.units import quantity_text, scale_for
+from fractalcontact.scenes._result_tables import amount
 
 ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 4").replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -201,6 +202,15 @@ def test_units_follow_the_values():
     assert [cells["nominal pressure"] for cells in rows(tree, "contact")] == ["1 MPa", "10 MPa"]
     assert rows(tree, "contact")[0]["closure"].endswith(" nm")
     assert "e+0" not in fc.scenes.summary(tree)
+
+
+def test_deviations_have_two_digits_also_before_the_point():
+    heights = xr.DataArray(
+        [16e-9, 18.6e-9, 20.8e-9], dims="member", name="mean_island_area", attrs={"units": "m2"}
+    )
+    assert amount(heights, scale=scale_for("m2", 1e-9)) == "18500 ± 2400 µm²"
+    heights = heights.copy(data=[220e-6, 359e-6, 480e-6]).assign_attrs(units="m")
+    assert amount(heights, scale=scale_for("m", 3e-4)) == "350 ± 130 µm"
 
 
 def test_column_has_one_unit_within_three_decades():
