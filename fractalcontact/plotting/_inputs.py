@@ -74,6 +74,8 @@ def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
             for name in MAPS:
                 own = data[name].dims if name in data.variables else CORE_DIMS
                 problems.require(set(CORE_DIMS) <= set(own), f"{argument}.{name}", "dims (..., y, x)", own)
+    if "shear" in data.dims and "shear" in data.coords and (np.diff(data["shear"].values) < 0).any():
+        data = data.sortby("shear")  # each was reached from the mated position: their order is no path
     first = [dim for dim in PATH_DIMS if dim in data.dims]
     result: xr.Dataset = data.transpose(*first, ..., *(dim for dim in CORE_DIMS if dim in data.dims))
     return result

@@ -18,6 +18,12 @@ def test_rigid_dilatancy_curves():
         assert holds(drawn(ax), [0, end], [0, end * float(expected.mean_slope)])
 
 
+def test_shears_in_any_order_make_one_curve():
+    opening = synthetic.dilatancy(forces=())
+    ax = plotting.dilatancy(opening.isel(shear=slice(None, None, -1)))
+    assert holds(drawn(ax), opening.shear, opening.rigid_dilatancy.sel(direction="E"))
+
+
 def test_elastic_dilatancy_curves():
     opening = synthetic.dilatancy()
     ax = plotting.dilatancy(opening, direction="N", reach=8e-4)
