@@ -44,7 +44,7 @@ def colour_limits(values: Array, clipped: float, tail: float = 0.25) -> tuple[fl
     low = lowest if low - lowest <= tail * (high - low) else low
     high = highest if highest - high <= tail * (high - low) else high
     if not high > low:
-        width = abs(high) * 1e-6 or 1.0  # of a plane with one value: any scale that has an extent
+        width = 0.1 * abs(high) or 1.0  # of a plane with one value: any scale whose ticks can be read
         return low - width, high + width, "neither"
     beyond = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     return low, high, beyond[lowest < low, highest > high]
