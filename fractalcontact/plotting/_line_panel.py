@@ -193,7 +193,7 @@ class LinePanel:
                                size=size / 2, weight="bold", ha="center", va="center_baseline", zorder=5,
                                annotation_clip=False, bbox=circle, arrowprops=leader)  # fmt: skip
             text.set_gid(LETTER_NAME)
-            text.set_in_layout(False)
+            text.set_in_layout(bool(lift))  # one above its point may reach beyond the axes
 
     def key(self, label: str, **style: Any) -> None:
         """Add an entry to the legend of the kinds of curves, on lines of its width; none without a label.

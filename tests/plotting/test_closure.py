@@ -186,6 +186,14 @@ def test_letters_do_not_overlap(closed, factor):
     assert apart.min() > 0.7 * boxes[0].width
 
 
+def test_letters_above_their_points_stay_on_the_figure(closed):
+    twice = closed.isel(shear=0, step=[0, 4, 0, 4, 4])
+    ax = plotting.plot(twice, "closure", marked=[0, 1, 2, 3, 4])
+    render(ax)
+    top = max(text.get_bbox_patch().get_window_extent().y1 for text in ax.texts)
+    assert top <= ax.figure.bbox.y1
+
+
 def test_line_of_proportional_growth_ends_with_the_curves():
     loads = np.geomspace(1.0, 1e4, 9)
     fraction = np.minimum(1e-2 * loads, 1.0)
