@@ -225,10 +225,11 @@ def _uplift_remarks(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
             more = float((joint / state["uplift_force"].sel(diagram=name)).mean()) - 1.0
             farther = float((arm - state["uplift_arm"].sel(diagram=name)).mean())
             way, safe = ("less", "on the safe side") if more < 0 else ("more", "NOT on the safe side")
-            where = "upstream" if farther < 0 else "downstream"
+            where = f"{length(abs(farther))} farther {'upstream' if farther < 0 else 'downstream'}"
+            acts = f", which acts {where}" if np.isfinite(farther) else ""  # no uplift acts nowhere
             yield (
-                f"{place}the {name} diagram is {safe}: the joint has {abs(100 * more):.1f} % {way} uplift, "
-                f"which acts {length(abs(farther))} farther {where}"
+                f"{place}the {name} diagram is {safe}: the joint has {abs(100 * more):.1f} % {way} "
+                f"uplift{acts}"
             )
 
 

@@ -86,6 +86,13 @@ def test_summary_says_whether_the_diagrams_are_safe(scene, tmp_path):
     assert "NOT on the safe side" not in fc.scenes.summary(tree) or less < 0
 
 
+def test_joint_without_uplift_has_no_line_of_action(scene):
+    tree = fc.scenes.run(scene(BALANCED.replace("shear = [2e-4, 6e-4]", "shear = [0.0]")), progress=False)
+    text = " ".join(fc.scenes.summary(tree, verbose=True).split())
+    assert "the joint has 100.0 % less uplift" in text
+    assert "which acts" not in text
+
+
 @pytest.mark.parametrize(
     ("total", "message"), [("3e7", "ends before the effective stress"), ("1.05e6", "it lifts the joint")]
 )
