@@ -294,7 +294,8 @@ def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> A
     if "rigid_dilatancy" in data:
         style = {"color": _style.ink(), "lw": _style.THIN}
         panel.line("rigid", shear, table(data, "rigid_dilatancy", ("shear",)), **style)
-        panel.family = Family([style, *loads.styles], ["0 (rigid)", *loads.labels], loads.name, loads.unit)
+        rigid = "0 (rigid)" if loads.name != "step" else "rigid"  # steps are numbers, not loads
+        panel.family = Family([style, *loads.styles], [rigid, *loads.labels], loads.name, loads.unit)
     if "direction" in data.coords:
         panel.ax.set_title(f"block slides {_paths.direction_name(words(data['direction'])[0])}")
     for number, target in enumerate(marked):

@@ -134,6 +134,10 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
     dims = dims[:1] if rows.first_dim else dims
     keys = dims or [dim for dim in rows.over if dim in data.coords][:1]
     others = {dim: -1 for dim in PATHS if dim in data.dims and dim not in dims}
+    load_dims = data[rows.load].dims if rows.load in data.variables else ()
+    along = "".join(
+        f", at the last {dim}" for dim in others if dim in load_dims
+    )  # the load of a spring changes
     data = data.isel(others)
     states = [
         data.isel(dict(zip(dims, place, strict=True)))
@@ -148,6 +152,7 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
     for dim in keys:
         values = [_key(dim, state, data, rows) for state in states]
         key_heads.append(KEYS.get(dim, (rows.load if dim == "step" else dim).replace("_", " ")))
+        key_heads[-1] += along if dim == "step" else ""
         key_cells.append(values)
     has_load = {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads
     if has_load and are_one(finite(data["nominal_pressure"])):

@@ -213,6 +213,18 @@ def test_deviations_have_two_digits_also_before_the_point():
     assert amount(heights, scale=scale_for("m", 3e-4)) == "350 ± 130 µm"
 
 
+def test_pressure_of_a_spring_says_at_which_shear_it_is():
+    face = fc.surfaces.fbm((48, 48), 2e-4, hurst=0.7, rms_increment=3e-5, rng=3)
+    crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=4.8e-3, basic_friction_angle=32)
+    options = {"shear": [0.0, 2e-4, 4e-4], "normal_force": [20.0, 60.0]}
+    for stiffness, head in ((5e9, "nominal pressure, at the last shear"), (None, "nominal pressure")):
+        climb = fc.joints.dilatancy(crack, normal_stiffness=stiffness, **options)
+        groups = {"/joints/elastic_dilatancy": climb, "/joints/friction": fc.joints.friction(climb)}
+        tree = xr.DataTree.from_dict(groups)
+        for title in ("elastic dilatancy", "peak shear strength"):
+            assert head in rows(tree, title)[0]
+
+
 def test_column_has_one_unit_within_three_decades():
     surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
     for pressures, shown in (([4e5, 6e5], ["0.4 MPa", "0.6 MPa"]), ([1e3, 1e7], ["1 kPa", "10 MPa"])):
