@@ -62,17 +62,18 @@ class Scale:
         return f"{number(shown, digits)} {self.unit}".rstrip() if np.isfinite(shown) else "-"
 
 
-PER_LENGTH = Scale(1e9, "MPa/mm")  # the unit of joint stiffness in practice
+# the units of stiffness in practice: of a joint, for its area, and of a body
+STIFFNESSES = {"Pa m-1": Scale(1e9, "MPa/mm"), "N m-1": Scale(1e6, "kN/mm")}
 
 
 def scale_for(units: str, values: Any) -> Scale:
-    """Return the scale for values in `units`: a prefix for those in `PREFIXED`, MPa/mm for a stiffness."""
+    """Return the scale for values in `units`: a prefix for those in `PREFIXED`, see also `STIFFNESSES`."""
     if units in ("", "1"):
         return Scale(1.0, "")
     if units == "degree":
         return Scale(1.0, "°")
-    if units == "Pa m-1":
-        return PER_LENGTH
+    if units in STIFFNESSES:
+        return STIFFNESSES[units]
     if not PREFIXED.match(units):
         return Scale(1.0, raise_exponents(units))
     power = int(units[-1]) if units[-1].isdigit() else 1

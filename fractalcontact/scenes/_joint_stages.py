@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.study import MEMBER, end_of_first_leg
-from fractalcontact.base.units import PER_LENGTH, Scale, jrc_text, number, quantity_text, scale_for
+from fractalcontact.base.units import STIFFNESSES, Scale, jrc_text, number, quantity_text, scale_for
 from fractalcontact.scenes._result_tables import Column, amount, are_one, at_value, finite, length, plain
 from fractalcontact.scenes._scene import LOADS
 from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType, stage_type
@@ -68,6 +68,14 @@ def _last_pressure(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the pressure on the block at the last step, where it is the same for all shears."""
     if are_one(finite(last["nominal_pressure"])):
         yield f"at the last step of the load, {amount(last['nominal_pressure'])} on the area of the block"
+
+
+def _pressure_of_a_spring(_: xr.DataTree, test: xr.Dataset) -> Iterator[str]:
+    """Yield between which pressures a spring, which the dilatancy loads, takes the block."""
+    stress = test["normal_stress"]
+    if float((stress.min("point") / stress.max("point")).min()) < 0.995:  # seen with three digits
+        low, high = (quantity_text(end, "Pa") for end in (finite(stress).min(), finite(stress).max()))
+        yield f"The nominal pressure is that at the start; the spring makes it {low} to {high} on the path."
 
 
 def _mean_slope(state: xr.Dataset) -> str | None:
@@ -157,7 +165,7 @@ def _preferred_law(state: xr.Dataset) -> str:
         closure = scale_for("m", state["greatest_closure_low"])
         greatest, stiffness = (
             _with_ends(state, "greatest_closure", closure),
-            _with_ends(state, "initial_stiffness", PER_LENGTH),
+            _with_ends(state, "initial_stiffness", STIFFNESSES["Pa m-1"]),
         )
         return f"hyperbolic, Vm {greatest}, Kni {stiffness}"
     if names[0] == "exponential":
@@ -443,6 +451,7 @@ STAGES = (
         Column("strength at the end", "residual_shear_strength"),
         Column("end at shear", end_of_first_leg, screen=False),
         Column("worn depth", lambda state: state["wear_depth"].max("point", keep_attrs=True)),
+        remarks=_pressure_of_a_spring,
         splits=("nominal_pressure",),
         one_direction=True,
         presses=True,

@@ -43,6 +43,7 @@ def test_prefix_matches_values(value, units):
         (4e6, "s", "4e+06 s"),
         (35.0, "degree", "35 °"),
         (2e9, "Pa m-1", "2 MPa/mm"),
+        (9e7, "N m-1", "90 kN/mm"),
         (0.25, "1", "0.25"),
         (0.0, "m", "0 m"),
     ],

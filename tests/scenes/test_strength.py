@@ -120,6 +120,19 @@ def test_end_of_the_first_leg_is_that_of_any_path(path, end):
     crack = fc.joints.Crack(face, young=3e10, poisson=0.2, block=2.4e-3, basic_friction_angle=31)
     labelled = xr.DataArray(path, dims="leg")
     test = fc.joints.direct_shear(crack, labelled, nominal_pressure=[1e6, 2e6], hardness=3e8)
+    assert "spring" not in fc.scenes.summary(
+        xr.DataTree.from_dict({"joints/direct_shear": test}), verbose=True
+    )
+    stiff = fc.joints.direct_shear(
+        crack, labelled, nominal_pressure=[1e6, 2e6], hardness=3e8, normal_stiffness=2e10
+    )
+    ends = " to ".join(
+        f"{end / 1e6:.3g} MPa" for end in (stiff.normal_stress.min(), stiff.normal_stress.max())
+    )
+    words = " ".join(
+        fc.scenes.summary(xr.DataTree.from_dict({"joints/direct_shear": stiff}), verbose=True).split()
+    )
+    assert f"the spring makes it {ends} on the path" in words
     tree = xr.DataTree.from_dict({"joints/direct_shear": test})
     assert f" {end} " in fc.scenes.summary(tree, verbose=True)
     envelope = fc.joints.strength_envelope(
