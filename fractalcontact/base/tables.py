@@ -12,6 +12,7 @@ from tabulate import tabulate
 
 GAP = 2  # spaces that tabulate puts between columns
 GLUE = "\N{NO-BREAK SPACE}"  # between number and unit while cells are wrapped
+BEFORE_UNIT = r"(?<=\d) (?=[%°]|[fpnµmkMGT]?(?:m|N|Pa|J|s)\b)"  # the space of a quantity in a sentence
 # the spaces of a quantity; where these make a table too wide, it may break before its ±
 QUANTITY = (r"(?<=\d) (?=[±µ%°A-Za-z])|(?<=±) ", r"(?<=\d) (?=[µ%°A-Za-z])|(?<=±) ")
 
@@ -83,4 +84,6 @@ def _longest_word(cell: str, most: int = 24) -> int:
 def note(words: str, indent: int = 2) -> str:
     """Return a remark, indented below its table and wrapped to the width of the screen."""
     first, rest = " " * indent, " " * (indent + 2)
-    return textwrap.fill(words, screen_width(), initial_indent=first, subsequent_indent=rest)
+    glued = re.sub(BEFORE_UNIT, GLUE, words)
+    filled = textwrap.fill(glued, screen_width(), initial_indent=first, subsequent_indent=rest)
+    return filled.replace(GLUE, " ")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from fractalcontact.base.tables import table
+from fractalcontact.base.tables import note, table
 
 
 def test_columns_are_aligned():
@@ -46,3 +46,14 @@ def test_column_without_words():
         ["1e-08"],
     ]
     assert table([("",), ("",)]).split() == ["--"]
+
+
+def test_quantity_of_a_sentence_keeps_its_unit_at_the_end_of_a_line(monkeypatch):
+    for width in range(30, 60):
+        monkeypatch.setenv("COLUMNS", str(width))
+        lines = [
+            line.strip()
+            for line in note("areas are up to 90 % above those at 1.5 MPa, and 300 µm apart").splitlines()
+        ]
+        assert all(line.startswith("areas") or line.split()[0] not in ("%", "MPa,", "µm") for line in lines)
+        assert "\N{NO-BREAK SPACE}" not in "".join(lines)
