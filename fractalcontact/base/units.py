@@ -27,6 +27,7 @@ UNITS = (*METRES, *PER_METRE, *SPELLINGS)
 PREFIXES = {
     18: "E", 15: "P", 12: "T", 9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "µ", -9: "n", -12: "p", -15: "f"
 }  # fmt: skip
+ROUNDING = {"m": 1e-15, "degree": 1e-9}  # what is less is the rounding of a result that is zero
 PREFIXED = re.compile(r"^(m|N|Pa|J|s|m2|m3|byte)$")
 PRESSURE = re.compile(r"^\s*([-+.\deE]+)\s*([kMG]?)(Pa)?\s*$")
 LENGTH = re.compile(r"^\s*([-+.\d]+(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
@@ -124,6 +125,18 @@ def raise_exponents(units: str) -> str:
     return re.sub(r"(?<=[A-Za-z])(-?\d+)", lambda match: match.group().translate(SUPERSCRIPT), units)
 
 
+def without_rounding(values: Any, units: str) -> Array:
+    """Return values with zeros for those of `ROUNDING`.
+
+    Examples
+    --------
+    >>> without_rounding([3e-20, 3e-12, float("nan")], "m")
+    array([0.e+00, 3.e-12,    nan])
+    """
+    values = np.asarray(values, dtype=np.float64)
+    return np.where(np.abs(values) < ROUNDING.get(units, 0.0), 0.0, values)
+
+
 def quantity_text(value: Any, units: str, digits: int = 3) -> str:
     """Return one value with its unit and SI prefix, "-" where there is none.
 
@@ -132,6 +145,7 @@ def quantity_text(value: Any, units: str, digits: int = 3) -> str:
     >>> quantity_text(1e6, "Pa"), quantity_text(-2.4e-5, "m"), quantity_text(999.9, "N")
     ('1 MPa', '-24 µm', '1 kN')
     """
+    value = without_rounding(value, units)
     return scale_for(units, value).text(value, digits)
 
 

@@ -35,7 +35,7 @@ from fractalcontact.base.study import (
     scene_of,
     stated_argument,
 )
-from fractalcontact.base.units import quantity_text, raise_exponents, scale_for
+from fractalcontact.base.units import quantity_text, raise_exponents, scale_for, without_rounding
 from fractalcontact.base.validation import Problems, reading, writing
 from fractalcontact.scenes._domain_stages import SIGNATURE
 from fractalcontact.scenes._export import tables
@@ -430,8 +430,9 @@ def _column(head: str, values: Any) -> tuple[str, list[str]]:
     name, units = name.replace("_", " "), units.rstrip(")")
     if values.dtype.kind != "f":
         return (f"{name} ({raise_exponents(units)})" if units else name), [str(value) for value in values]
-    scale = scale_for(units, values.to_numpy())
-    cells = ["-" if not np.isfinite(value) else f"{value:.4g}" for value in scale(values.to_numpy())]
+    numbers = without_rounding(values, units) + 0.0  # no zero keeps a sign
+    scale = scale_for(units, numbers)
+    cells = ["-" if not np.isfinite(value) else f"{value:.4g}" for value in scale(numbers)]
     return scale.label(name), cells
 
 

@@ -17,7 +17,7 @@ import xarray as xr
 from fractalcontact.base.compass import direction_text
 from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.base.schema import units_of
-from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for
+from fractalcontact.base.units import Scale, fixed, number, quantity_text, scale_for, without_rounding
 
 Remarks = Callable[[xr.DataTree, xr.Dataset], Iterable[str]]
 
@@ -237,15 +237,15 @@ def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
 
     `scale` is that of a column, see `column_scale`.
     """
-    name = str(data.name)
-    if name in FRACTIONS:
+    units = units_of(data.name, data.attrs)
+    values = without_rounding(data.values, units)
+    known = values[np.isfinite(values)]
+    if str(data.name) in FRACTIONS:
         scale = Scale(0.01, "%")
     elif scale is None:
-        scale = scale_for(
-            units_of(data.name, data.attrs), float(finite(data).mean()) if finite(data).size else np.nan
-        )
+        scale = scale_for(units, float(known.mean()) if known.size else np.nan)
     unit = f" {scale.unit}".rstrip()
-    return _over_members(scale(data.values), lambda value: number(value, digits), _decimals_of, unit)
+    return _over_members(scale(values), lambda value: number(value, digits), _decimals_of, unit)
 
 
 def column_scale(data: Any) -> Scale | None:
@@ -254,13 +254,14 @@ def column_scale(data: Any) -> Scale | None:
     A prefix spans so many: in the unit of the greatest value the least would have none of its digits. Lengths
     that are all zero are in millimetres.
     """
-    sizes = np.abs(finite(data))
+    units = units_of(data.name, data.attrs)
+    sizes = np.abs(without_rounding(finite(data), units))
     sizes = sizes[sizes > 0]
     if sizes.size == 0:
-        return Scale(1e-3, "mm") if units_of(data.name, data.attrs) == "m" else None
+        return Scale(1e-3, "mm") if units == "m" else None
     if sizes.max() >= 1e3 * sizes.min():
         return None
-    return scale_for(units_of(data.name, data.attrs), float(np.median(sizes)))
+    return scale_for(units, float(np.median(sizes)))
 
 
 def plain(data: Any, decimals: int, *, sign: bool = False) -> str:

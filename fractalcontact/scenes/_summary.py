@@ -15,7 +15,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of, member_count, of_member, scene_of
 from fractalcontact.base.tables import note, table
-from fractalcontact.base.units import number, quantity_text
+from fractalcontact.base.units import number, quantity_text, without_rounding
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._result_tables import ResultTable, length, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
@@ -92,7 +92,7 @@ def _openings(tree: xr.DataTree) -> Iterator[str]:
     aperture = aperture_as_placed(tree)
     if aperture is None:
         return
-    mean, smallest = float(aperture.mean()), float(aperture.min())
+    mean, smallest = without_rounding([aperture.mean(), aperture.min()], "m")
     lifted = (
         f"; rigid, the faces first touch with the upper one lifted by {length(-smallest)}, at a mean "
         f"aperture of {length(mean - smallest)}"

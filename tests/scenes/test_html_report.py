@@ -298,6 +298,17 @@ def test_tables_hold_every_variable_but_maps(study):
             assert ({"x", "y"} & set(variable.dims)) or name in columns, (node.path, name)
 
 
+def test_tables_of_the_page_show_rounding_as_zero(tmp_path):
+    """The mean of levelled heights is some 1e-21 m, here below zero."""
+    data = xr.Dataset(
+        {"mean_height": ("scan", [-3e-21, 0.0, -0.0], {"units": "m", "long_name": "mean height"})}
+    )
+    page = fc.scenes.report(xr.DataTree.from_dict({"surfaces": data}), tmp_path / "page.html", figures=())
+    text = page.read_text(encoding="utf-8")
+    assert "mean height (m)" in text
+    assert not re.search(r"mean height \(fm\)|-0<|-3e-21", text)
+
+
 def test_flags_are_words_in_the_tables(study, tmp_path):
     frames = fc.scenes.tables(study[0], tmp_path)
     for name, group, flag in (

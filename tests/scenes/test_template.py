@@ -252,6 +252,18 @@ def test_faces_of_a_joint_are_not_levelled_one_by_one(scans):
         fc.scenes.template("joint", "lower.nc", "upper.nc", young=3e10, level=1)
 
 
+def test_scan_on_itself_shows_zeros_and_no_rounding(tmp_path, capsys):
+    """Registration moves it by some 1e-19 m, and turns it by 1e-15 degree."""
+    face = fc.surfaces.fbm((16, 16), 1e-3, hurst=0.8, rms_increment=3e-5, rng=1)
+    fc.save(face, tmp_path / "face.nc")
+    command = ["joint", *[str(tmp_path / "face.nc")] * 2, "--young", "30GPa", "-o", str(tmp_path / "out")]
+    assert main([*command, "--verbose"]) == 0
+    out = capsys.readouterr().out
+    assert "aperture: mean 0 m, smallest 0 m\n" in out
+    assert "fm" not in out
+    assert "rotation 0 °" in " ".join(out.split())
+
+
 def test_spikes_of_a_roughness_scan(scans, capsys):
     """Twenty false points: said with D and JRC without them, and gone with --despike."""
     lower = fc.open("lower.nc").load()
