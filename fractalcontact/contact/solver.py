@@ -173,13 +173,16 @@ def _scalars(step: Step, grid: Grid) -> dict[str, Any]:
     contact, periodic = step.contact, step.path.body.periodic
     cells = int(np.count_nonzero(contact))
     edges = int(contact_edges(contact, (periodic, periodic)).sum())
+    least = step.force / (
+        step.path.hardness * grid.nominal_area
+    )  # that bears the force; 0 without a hardness
     scalars = {
         "closure": step.closure,
         "normal_force": step.force,
         "nominal_pressure": step.force / grid.nominal_area,
         "contact_area": cells * grid.cell_area,
         "contact_fraction": cells / contact.size,
-        "corrected_contact_fraction": (cells - EXCESS_PER_EDGE * edges) / contact.size,
+        "corrected_contact_fraction": max((cells - EXCESS_PER_EDGE * edges) / contact.size, least),
         "mean_gap": step.mean_gap,
         "elastic_energy": step.elastic_energy,
         "plastic_work": step.plastic_work,

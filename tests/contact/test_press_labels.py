@@ -124,3 +124,17 @@ def test_steep_surfaces_warn_and_flat_ones_do_not():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fc.contact.press(sine(0.29), contact_modulus=1.0, nominal_pressure=1e-3)
+
+
+def test_corrected_area_bears_the_force():
+    """No node bears more than the hardness, so that no area below force over hardness can carry the load."""
+    surface = fc.surfaces.spectral((96, 96), 1e-6, hurst=0.8, rolloff=4e-5, rms_slope=0.15, rng=3)
+    loads = [5e7, 2e8, 5e7, 1e6]
+    options = {"contact_modulus": 1.1e11, "nominal_pressure": loads, "hardness": 3e9}
+    pressed = fc.contact.press(surface, **options)
+    least = np.array(loads) / 3e9
+    assert (pressed.corrected_contact_fraction >= least).all()
+    assert (pressed.corrected_contact_fraction <= pressed.contact_fraction).all()
+    assert pressed.corrected_contact_fraction.values[1] == pytest.approx(
+        least[1]
+    )  # all nodes yield, or nearly
