@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fractalcontact.base.study import group_of
+from fractalcontact.base.units import number
 from fractalcontact.scenes._result_tables import Column, at_value, finite, length, plain
 from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, stage_type
 
@@ -21,7 +23,7 @@ def _window(state: xr.Dataset) -> str | None:
     if state[names[0]].attrs.get("units") == "m":
         text = f"{length(low.min())} to {length(high.max())}"
     else:
-        text = f"{low.min():g} to {high.max():g} cells"
+        text = f"{number(low.min())} to {number(high.max())} cells"
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
@@ -81,15 +83,23 @@ def _longest_scale(name: str) -> Any:
     return lambda state: state[name].isel(scale=-1) if name in state else None
 
 
-def _signature_window(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+def _signature_window(
+    _: xr.DataTree, data: xr.Dataset, others: str = "; clustering and patches at {}"
+) -> Iterator[str]:
     """Yield the windows (each member has its own), and why some states have no dimension."""
     ends = zip(*(data[name].values.ravel() for name in ("window_low", "window_high")), strict=True)
     for low, high in dict.fromkeys((length(low), length(high)) for low, high in ends if np.isfinite(low)):
-        yield f"D is over {low} to {high}, beside that of random spots; clustering and patches at {high}."
+        yield f"D is over {low} to {high}, beside that of random spots{others.format(high)}."
     reasons = [str(reason) for reason in data["reason"].values.ravel() if reason]
     if reasons:
         of_which = "" if len(set(reasons)) == 1 else "; the last of them"
         yield f"{len(reasons)} of {data['reason'].size} states have no dimension{of_which}: {reasons[-1]}."
+
+
+def _evolution_window(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield what holds for its dimensions, unless the table of the signature, which has the same, says it."""
+    if group_of(tree, SIGNATURE) is None:
+        yield from _signature_window(tree, data, others="")
 
 
 SIGNATURE = "domains/signature"
@@ -110,11 +120,11 @@ def _domain(
     )
 
 
-def _set_dimension(name: str, words: str, **more: Any) -> StageType:
+def _set_dimension(name: str, words: str, null: str = " (random)", **more: Any) -> StageType:
     return _domain(
         name,
         words,
-        Column(f"{words} D (random)", _beside_null(name, "null_dimension")),
+        Column(f"{words} D{null}", _beside_null(name, "null_dimension")),
         Column("over", _window),
         Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
         remarks=_beside_random,
@@ -148,7 +158,7 @@ STAGES = (
             for order in (0, 1, 2)
         ),
     ),
-    _set_dimension("boundary_dimension", "boundary"),
+    _set_dimension("boundary_dimension", "boundary", null=""),
     _domain(
         "lacunarity",
         "lacunarity",
@@ -189,7 +199,7 @@ STAGES = (
         Column("merges", "merges", 0),
         Column("splits", "splits", 0),
         Column("D (random spots)", _window_dimension, screen=False),
-        remarks=_signature_window,
+        remarks=_evolution_window,
         needs=(SIGNATURE,),
         whole_path=True,
     ),

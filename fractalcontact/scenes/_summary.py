@@ -383,7 +383,7 @@ def _cells_per_island(pressed: xr.Dataset) -> xr.DataArray:
     """Return the median number of cells of the islands of contact, over the dims of the contact area.
 
     Where no map of the contact is stored, it is the number of cells of square islands with the same ratio of
-    perimeter to area. NaN where nothing touches.
+    perimeter to area, and more where a hardness bounds the corrected area. NaN where nothing touches.
     """
     fraction = pressed["contact_fraction"]
     if "state" in pressed:

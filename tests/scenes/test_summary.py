@@ -450,6 +450,29 @@ def test_reason_of_states_without_a_dimension_belongs_to_one_of_them():
     assert f"2 of 2 states have no dimension: {signature.reason.values[0]}." in words
 
 
+def test_window_of_the_signature_is_said_once_and_where_its_columns_are():
+    mask = xr.DataArray(np.random.default_rng(1).random((2, 64, 64)) < 0.02, dims=("step", "y", "x"))
+    mask = mask.assign_coords({dim: np.arange(64) * 1e-4 for dim in "yx"})
+    groups = {f"domains/{name}": getattr(fc.domains, name)(mask) for name in ("signature", "evolution")}
+    both, alone = (
+        remarks(xr.DataTree.from_dict({name: groups[name] for name in names}))
+        for names in (groups, ["domains/evolution"])
+    )
+    assert both.count("D is over") == both.count("; clustering and patches at") == 1
+    assert alone.count("D is over") == 1
+    assert "patches" not in alone
+
+
+def test_boundary_has_three_digits_and_names_no_random_null():
+    surface = fc.surfaces.spectral((96, 96), 1e-6, hurst=0.8, rolloff=4e-5, rms_slope=0.15, rng=3)
+    mask = surface > 2e-7
+    words = remarks(
+        xr.DataTree.from_dict({"domains/boundary_dimension": fc.domains.boundary_dimension(mask)})
+    )
+    assert "(random)" not in words
+    assert "1 to 2.83 cells" in words
+
+
 def test_numbers_of_caveats_have_no_exponents():
     surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
     pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=[1e6, 1e7])
