@@ -65,8 +65,10 @@ def detrended(heights: Array, order: int, wraps: Sequence[bool] = ()) -> tuple[A
     order : int
         Total degree of the polynomial.
     wraps : sequence of bool
-        Axes along which the heights are periodic: they come back to their height, and have no slope.
+        Axes along which the heights are periodic: they come back to their height, and have no slope. Nor has
+        an axis of one point.
     """
+    wraps = [w or n == 1 for w, n in zip(wraps or (False,) * heights.ndim, heights.shape, strict=True)]
     values, _, scale = shifted(heights)
     observed = np.isfinite(values)
     is_complete = bool(observed.all())

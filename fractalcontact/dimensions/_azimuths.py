@@ -310,8 +310,7 @@ class Classes:
         lnq = self.by_ring(self.lnq, self.count)
         level, white = self.by_ring(logs, share), np.add.reduceat(weight, starts)
         ln_alias = np.add.reduceat(even * alias_logs(*self.sample, modes.dy, 2), starts)
-        finest = min(1.0, modes.dy)
-        return Bins(level, 1.0 / total, tables, nodes, t, white, lnq, ln_alias, extent, finest, 2)
+        return Bins(level, 1.0 / total, tables, nodes, t, white, lnq, ln_alias, extent, min(1.0, modes.dy), 2)
 
     def along(self, spectrum: MetricSpectrum, azimuths: Array) -> Array:
         """Fit amplitude and exponent to all waves, and to those about azimuths (degree).

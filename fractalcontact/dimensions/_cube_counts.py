@@ -198,7 +198,9 @@ def _area_ratios(heights: Array, edges: Array, spacing: tuple[float, float]) -> 
     for k, (ey, ex) in enumerate(edges):
         if is_profile:
             slope = (heights[0, ex:] - heights[0, :-ex]) / (ex * spacing[1])
-            ratios[k] = _mean(np.sqrt(1.0 + slope * slope))
+            stretch = np.sqrt(1.0 + slope * slope)
+            stretch = stretch[np.isfinite(stretch)]
+            ratios[k] = stretch.mean() if stretch.size else np.nan
             continue
         sums = np.zeros(heights.shape[0] - ey)
         counts = np.zeros(sums.size, dtype=np.int64)
@@ -206,9 +208,3 @@ def _area_ratios(heights: Array, edges: Array, spacing: tuple[float, float]) -> 
         in_bands(prism_sums, sums.size, heights.size, heights, *cell, sums, counts)
         ratios[k] = np.cumsum(sums)[-1] / counts.sum() if counts.any() else np.nan
     return ratios
-
-
-def _mean(values: Array) -> float:
-    """Return the mean of the finite values."""
-    values = values[np.isfinite(values)]
-    return float(np.sum(values)) / values.size if values.size else float("nan")

@@ -77,9 +77,10 @@ def weights(
     return np.asarray(0.5 * np.where(np.arange(t.size) < t.size - 1, weight, weight * last) / unit)
 
 
-def log_bend(lnq: Array | float, hurst: float, corner: float, long_hurst: float, sharpness: float) -> Array:
-    """Return the logarithm of the factor of a corner, at logarithms of wavenumbers."""
-    bend = np.logaddexp(0.0, 2.0 * sharpness * (math.log(corner) - lnq))
+def log_bend(squares: Array, theta: Array) -> Array:
+    """Return the logarithm of the factor of a corner at squared wavenumbers; theta: see `Bins.log_power`."""
+    hurst, _, _, corner, long_hurst, sharpness = theta
+    bend = np.logaddexp(0.0, sharpness * np.log(corner**2 / np.maximum(squares, 1e-30)))
     return np.asarray((long_hurst - hurst) / sharpness * bend)
 
 
@@ -102,8 +103,7 @@ def alias_logs(y: Array, x: Array, dy: float, axes: int) -> Array:
     Wavenumbers are in radians per x spacing; `dy` is the other spacing.
     """
     down, across = 2.0 * np.pi * np.mgrid[1 - axes : axes, -1:2].reshape(2, -1, 1)
-    squares = np.square(y + down / dy) + np.square(x + across)
-    aliases = np.delete(squares, len(squares) // 2, axis=0)
+    aliases = np.delete(np.square(y + down / dy) + np.square(x + across), 3**axes // 2, axis=0)
     power = aliases ** (-0.5 * (1.0 + axes))
     return np.asarray(0.5 * (power * np.log(aliases)).sum(axis=0) / power.sum(axis=0))
 
@@ -408,11 +408,6 @@ class Lattice:
     def shortest_edge(self) -> float:
         """Length of the shorter edge, in x spacings."""
         return min(n * d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
-
-    @property
-    def finest(self) -> float:
-        """Smaller of the spacings, in x spacings."""
-        return min(d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
 
     @property
     def steps(self) -> tuple[float, float]:

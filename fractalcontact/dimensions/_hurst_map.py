@@ -285,18 +285,10 @@ class _Model:
         number = bin_numbers(lattice, keep).ravel()
         order = np.argsort(number, kind="stable")[np.count_nonzero(number < 0) :]
         count = np.bincount(number[order])
-        return cls(
-            fit,
-            first.scale * middle.unit,
-            known,
-            lattice,
-            pilot,
-            order,
-            np.cumsum(count) - count,
-            count,
-            make_bins(lattice, pilot, pilot, keep),
-            np.bincount(number[order], pilot.ravel()[order]) / count,
-        )
+        unit, starts = first.scale * middle.unit, np.cumsum(count) - count
+        bins = make_bins(lattice, pilot, pilot, keep)
+        expected = np.bincount(number[order], pilot.ravel()[order]) / count
+        return cls(fit, unit, known, lattice, pilot, order, starts, count, bins, expected)
 
     def means(self, heights: Array, columns: Array, at_once: int = 1 << 20) -> Array:
         """Return the mean power over the pilot of the bins of windows in a row, shape (windows, bins).

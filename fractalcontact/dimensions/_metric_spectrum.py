@@ -28,7 +28,7 @@ from fractalcontact.dimensions._gaussian_mixture import (
     log_bend,
 )
 from fractalcontact.dimensions._mode_bins import block_product
-from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, LONG_HURST, NOISE, SHARPNESS, SPREAD
+from fractalcontact.dimensions._spectral_posterior import CORNER, HURST, NOISE, SPREAD
 
 # of the interpolation, and images each way over those summed one by one: density of a ratio of 4 to .1 %, of
 # 8 to 2 %
@@ -107,11 +107,6 @@ class MetricSpectrum:
         total *= 2.0 ** (2.0 * hurst + 1.0) * np.pi * hurst * gammas / self.dy
         return np.asarray(np.maximum(total, 1e-300))
 
-    def _log_bend(self, squares: Array) -> Array:
-        """Return the logarithm of the factor of the corner at squared wavenumbers."""
-        lnq = 0.5 * np.log(np.maximum(squares, 1e-30))
-        return log_bend(lnq, *self.theta[[HURST, CORNER, LONG_HURST, SHARPNESS]])
-
     def _near_images(self, y: Array, x: Array) -> Array:
         """Return the sum of the nearest images."""
         near_y, near_x = (0, 0) if self.form == UNALIASED else _nearest(self.dy)
@@ -123,7 +118,7 @@ class MetricSpectrum:
         if self.theta[SPREAD] > 0.0 and self.form != FILTERED:
             density -= self.theta[SPREAD] ** 2 * (qy * qy + qx * qx)
         if self.theta[CORNER] > 0.0:
-            density += self._log_bend(qy * qy + qx * qx)
+            density += log_bend(qy * qy + qx * qx, self.theta)
         return np.asarray(np.exp(density, out=density).sum(axis=(0, 1)))
 
     def with_noise(self, y: Array, x: Array) -> Array:
@@ -140,7 +135,7 @@ class MetricSpectrum:
         by_azimuth = squared_length(self.inverse, sine, cosine) ** (-1.0 - hurst)
         beyond = np.mean(by_azimuth * radial) * (self.dy / (4.0 * np.pi * hurst))
         if self.theta[CORNER] > 0.0:
-            images = images * np.exp(self._log_bend(y * y + x * x))
+            images = images * np.exp(log_bend(y * y + x * x, self.theta))
         return np.asarray(polynomials @ (images.sum(axis=2) + beyond) @ polynomials.T)
 
 

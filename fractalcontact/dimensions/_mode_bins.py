@@ -58,7 +58,7 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
     power = block_product((rows * weight[:, None]).T, columns)
     np.maximum(power, 1e-300, out=power)
     if theta[3] > 0.0:
-        power *= np.exp(log_bend(np.log(lattice.q), *theta[[0, 3, 4, 5]]))
+        power *= np.exp(log_bend(np.square(lattice.q), theta))
     power += theta[2] ** 2
     return np.asarray(power)
 
@@ -284,7 +284,7 @@ def make_bins(
         lnq=lnq / count,
         ln_alias=np.bincount(bins, aliases) / np.bincount(bins),
         extent=lattice.longest,
-        finest=lattice.finest,
+        finest=min(lattice.spacing[-lattice.axes :]),
         axes=lattice.axes,
     )
 

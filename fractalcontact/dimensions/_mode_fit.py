@@ -184,7 +184,7 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     if lattice.periodic:
         heights = heights - heights[observed].mean()
     else:
-        heights = detrended(heights.reshape(shape[-surface.axes :]), 1)[0].reshape(shape)
+        heights = detrended(heights, 1)[0]
     scale = rms_increment(heights)
     heights /= scale
     filled = fill(heights)

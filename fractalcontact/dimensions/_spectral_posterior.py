@@ -374,11 +374,7 @@ def posterior(
 
 
 def _discrepancies(
-    bins: Bins,
-    pilot_spread: float,
-    *,
-    room: float = 3.0,
-    fourth_order: float = 0.125,
+    bins: Bins, pilot_spread: float, *, room: float = 3.0, fourth_order: float = 0.125
 ) -> list[Discrepancy]:
     """Return the kinds of discrepancy with their prior probabilities, which sum to one.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
@@ -125,7 +125,7 @@ def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) 
     total: Array | None = None
     number = 0
     for part in _tiles(surface, tile):
-        heights = without_trend(part, (False, *periodic)[-2:])
+        heights = detrended(part, 1, (False, *periodic)[-2:])[0]
         power, _ = spectra.periodogram(heights if axes == 2 else heights[0], spacing, tapers)
         total = power if total is None else total + power
         number += 1
@@ -138,12 +138,6 @@ def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) 
         count = spectra.half_weights(shape[0])[1:].astype(np.int64)
     mean = np.where(mean > _ROUNDING * mean.max(), mean, 0.0)
     return Curve(q, mean * (surface.unit**2 if tile is None else 1.0), count, has_wavenumbers=True)
-
-
-def without_trend(heights: Array, wraps: Sequence[bool]) -> Array:
-    """Return complete heights without their least-squares plane, which is level along an axis that wraps."""
-    is_level = [w or n == 1 for w, n in zip(wraps, heights.shape, strict=True)]
-    return detrended(heights, 1, is_level)[0]
 
 
 def _tiles(surface: Surface, tile: int | None) -> Iterator[Array]:

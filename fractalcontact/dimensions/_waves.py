@@ -21,10 +21,10 @@ import xarray as xr
 from fractalcontact.base import fft
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
+from fractalcontact.base.regression import detrended
 from fractalcontact.base.results import public_result
 from fractalcontact.base.units import quantity_text
 from fractalcontact.base.validation import Problems
-from fractalcontact.dimensions._spectrum import without_trend
 from fractalcontact.dimensions._surface_input import Surface, check_surface, middle_slices, read_surfaces
 
 SMALLEST = 16  # points along an axis
@@ -147,7 +147,7 @@ def without_waves(
     found, rest = find_waves(surface)
     if not found:
         return surface, ""
-    before = without_trend(surface.heights, [all(surface.grid.periodic)] * 2)
+    before = detrended(surface.heights, 1, [all(surface.grid.periodic)] * 2)[0]
     left = _mean_square_increment(rest) / _mean_square_increment(before)
     sets = _sets(found, surface.shape)
     if left < (few_left if len(sets) > few else none_left) or _is_progression(found, few):
@@ -197,12 +197,12 @@ def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
     crop = middle_slices(shape, LARGEST_CROP)
     is_part = max(shape) > LARGEST_CROP
     is_periodic = all(surface.grid.periodic) and not is_part
-    part = without_trend(surface.heights[crop], [is_periodic] * 2)
+    part = detrended(surface.heights[crop], 1, [is_periodic] * 2)[0]
     search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
     peaks = [] if surface.is_enlarged else search.peaks(part)
     if not peaks:
         return [], surface.heights
-    rest = without_trend(surface.heights, [is_periodic] * 2)
+    rest = detrended(surface.heights, 1, [is_periodic] * 2)[0]
     part = rest[crop]  # a view: it changes with the rest
     found: list[Wave] = []
     for _ in range(MOST):

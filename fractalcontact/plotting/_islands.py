@@ -12,13 +12,7 @@ from fractalcontact.base.numbers import Array, spread_indices
 from fractalcontact.base.validation import Problems
 from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
-from fractalcontact.plotting._inputs import (
-    as_dataset,
-    require_dims,
-    require_known_dims,
-    result_of,
-    table,
-)
+from fractalcontact.plotting._inputs import as_dataset, require_dims, require_known_dims, result_of, table
 from fractalcontact.plotting._line_panel import Family, LinePanel, ordered
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import PLAIN, Quantity, Units, name_of, number_texts, scale_of
