@@ -379,10 +379,10 @@ def coulomb_path(
         if state is not None and tangential == forces[row - 1]:  # a pause is no step
             state = replace(state, iterations=0)
         else:
-            target, near = unit * (tangential / units.force), starts[max(row - 1, 0) : row + 1]
-            state = solver.step(
-                slip, target, shifted_start(state, near / units.pressure, bound, unit, target)
-            )
+            target = unit * (tangential / units.force)
+            near = starts[max(row - 1, 0) : row + 1] / units.pressure
+            guess = shifted_start(state, near, bound, unit, target)
+            state = solver.step(slip, target, guess)
             dissipated += float(np.sum(state.q * state.slip))
             slip = slip + state.slip
         all_stick = contact.all() and not state.slips.any()

@@ -125,8 +125,8 @@ def partial_slip(
     directions: within a few per cent on isotropic surfaces. Under a lay, displacement and dissipated energy
     are up to (2 - nu)/(2 - 2 nu) times the true ones across it, down to 1 - nu/2 times along it. Neither
     method has the change of the pressure between dissimilar bodies. A change of the force below `tolerance`
-    times the normal force is not resolved. The stiffness is that of a further step, zero where all slides
-    ("full": perhaps of a loop that has just closed), and of periodic bodies without bulk (full contact: NaN).
+    times the normal force is not resolved. The stiffness is that of a further step, zero where all slides;
+    "full" may give that of a loop that has just closed. Of periodic bodies in full contact it is NaN.
 
     Examples
     --------

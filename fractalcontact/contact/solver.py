@@ -173,9 +173,8 @@ def _scalars(step: Step, grid: Grid) -> dict[str, Any]:
     contact, periodic = step.contact, step.path.body.periodic
     cells = int(np.count_nonzero(contact))
     edges = int(contact_edges(contact, (periodic, periodic)).sum())
-    least = step.force / (
-        step.path.hardness * grid.nominal_area
-    )  # that bears the force; 0 without a hardness
+    # the share that bears the force; 0 without a hardness
+    least = step.force / (step.path.hardness * grid.nominal_area)
     scalars = {
         "closure": step.closure,
         "normal_force": step.force,

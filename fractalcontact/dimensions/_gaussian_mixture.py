@@ -257,7 +257,7 @@ class Bins:
         They are those by theta, see `log_power`, and by the logarithm of `share`, that of the waves longer
         than two points. The rest are aliases, which have about the factor of their mean wave: power of a
         Matern roll-off at 16 spacings (H = .2) is then off by .0009 (rms, apart from its level), with the
-        factor of the waves themselves by .0049; at 16 spacings of 1 and 4 by .006.
+        factor of the waves themselves by .0049; with spacings of 1 and 4 by .006.
         """
         from scipy.special import expit
 

@@ -57,7 +57,7 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
     rows, columns = lattice.transforms(float(theta[1]), edges=edges)[form]
     power = block_product((rows * weight[:, None]).T, columns)
     np.maximum(power, 1e-300, out=power)
-    if theta[3] > 0.0:
+    if theta[3] > 0.0:  # of aliases, too, unlike in `Bins`: there this power divides out
         power *= np.exp(log_bend(np.square(lattice.q), theta))
     power += theta[2] ** 2
     return np.asarray(power)

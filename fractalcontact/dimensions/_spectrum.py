@@ -25,9 +25,8 @@ from fractalcontact.dimensions._surface_input import (
     read_surfaces,
 )
 
-_ROUNDING = (
-    2.0**-100
-)  # of the largest power: the square of the rounding of a height, 2^-53, with a margin of 64
+# of the largest power: the square of the rounding of a height, 2^-53, with a margin of 64
+_ROUNDING = 2.0**-100
 _NAMES = {2: "power_spectral_density", 1: "profile_power_spectral_density"}  # by number of axes
 
 

@@ -377,16 +377,15 @@ class WornJoint:
         self.shear_stiffness, self.reason = math.inf, ""  # elastic, Pa/m; why the test ended before the path
 
     def shift(self, position: float) -> tuple[int, int]:
-        """Return the cells (y, x) from the start to a position (m) whose rounding grows with the path."""
+        """Return the whole cells (y, x) from the start to a position (m): rounding adds up along the path."""
         y, x = self.crack.layout.shift(position, self.towards.unit)
         return round(y), round(x)
 
     def contact(self, position: float, *, elastic: bool = False) -> ShearedContact:
         """Return the faces as they are worn now, at a position (m); `elastic`: without a hardness."""
         layout, (lower, upper) = self.crack.layout, self.crack.faces()
-        heights = heights_under(lower - self.lower_wear, layout, self.shift(position)) - (
-            upper + self.upper_wear
-        )
+        under = heights_under(lower - self.lower_wear, layout, self.shift(position))
+        heights = under - (upper + self.upper_wear)
         problem = self.problem
         if elastic:
             problem = replace(problem, options=replace(problem.options, hardness=None))

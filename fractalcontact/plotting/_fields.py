@@ -180,7 +180,7 @@ def field(data: Any, *, title: str | None = None, units: Units | None = None, ax
     ----------
     data : DataArray
         Dims (y, x); leading dims of length one are dropped. Zero pressures and gaps are drawn pale, and
-        islands (`label`) in twelve colours, of which one neighbour in 15 has the same.
+        islands (`label`) in twelve colours, of which about one neighbour in 15 has the same.
     title : str, optional
         Default: the number of islands of labels, else none.
     {shared}

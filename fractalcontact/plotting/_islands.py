@@ -24,8 +24,8 @@ SEVERAL = ("member", "direction", "shear", "step")
 def islands(result: Any, *, units: Units | None = None, axes: Panels | None = None) -> AxesArray:
     """Draw a map of the islands of a contact domain and the distribution of their areas.
 
-    The left panel shows the islands in twelve colours, of which one neighbour in 15 has the same. The right
-    panel shows the number of islands whose area is at least A, against A.
+    The left panel shows the islands in twelve colours, of which about one neighbour in 15 has the same. The
+    right panel shows the number of islands whose area is at least A, against A.
 
     Parameters
     ----------

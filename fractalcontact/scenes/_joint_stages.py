@@ -71,7 +71,7 @@ def _last_pressure(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
 
 
 def _pressure_of_a_spring(_: xr.DataTree, test: xr.Dataset) -> Iterator[str]:
-    """Yield between which pressures a spring, which the dilatancy loads, takes the block."""
+    """Yield the range of the pressure where it is that of a spring, which the dilatancy loads."""
     stress = test["normal_stress"]
     if float((stress.min("point") / stress.max("point")).min()) < 0.995:  # seen with three digits
         low, high = (quantity_text(end, "Pa") for end in (finite(stress).min(), finite(stress).max()))

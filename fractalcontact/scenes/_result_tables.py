@@ -135,9 +135,8 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
     keys = dims or [dim for dim in rows.over if dim in data.coords][:1]
     others = {dim: -1 for dim in PATHS if dim in data.dims and dim not in dims}
     load_dims = data[rows.load].dims if rows.load in data.variables else ()
-    along = "".join(
-        f", at the last {dim}" for dim in others if dim in load_dims
-    )  # the load of a spring changes
+    # the load of a spring changes along the shear
+    along = "".join(f", at the last {dim}" for dim in others if dim in load_dims)
     data = data.isel(others)
     states = [
         data.isel(dict(zip(dims, place, strict=True)))
