@@ -3,13 +3,13 @@
 The expected power of a bin b is
 
     E_b = A { B(q) U_b + B(q_a) (S_b - U_b) + nu^2 W_b },    S_b = sum_j w_j(H) M_bj(s, form),  (1)
-    B(q) = (1 + (q_0 / q)^(2 p))^((H_2 - H) / p),    p = k |H_2 - H|
+    B(q) = (1 + (q_0 / q)^(2 p))^((H_2 - H) / p),    p = k min(|H_2 - H|, 1)
 
 with the Gaussians j of `_gaussian_mixture`. U is that part of S whose waves are longer than two points;
 the others, aliases, have about the bend at the mean wavenumber q_a of the nearest ones. H is the exponent,
 s the spread of a blur, nu white noise over the rms increment, q_0 the wavenumber beyond which long waves
-have the exponent H_2, k the sharpness of that corner: 1 where two surfaces were added, 1 / (1 + H) of a
-Matern covariance, large of a sudden plateau. The amplitude A has a flat prior in ln A, or is (n / nu)^2
+have the exponent H_2, k the sharpness of that corner: 1 where two surfaces were added and of a Matern
+covariance, large of a sudden plateau. The amplitude A has a flat prior in ln A, or is (n / nu)^2
 where the height n of the noise is known; the others have those of the constants below. Heights were
 sampled after the blur, before it, or without waves shorter than two points. The logarithms of the bins are
 normal, and
@@ -457,9 +457,11 @@ def _theta(u: Array, fixed: Array, prior: Array) -> Array:
     for k in (SPREAD, NOISE, SHARPNESS):
         theta[..., k] = np.exp(low[k] + high[k] * u[..., k])
     theta = np.where(np.isnan(fixed), theta, fixed)
-    # p of (1), and a corner below half of 1 / s: an octave of waves between corner and blur shows H
-    difference = theta[..., LONG_HURST] - theta[..., HURST]
-    theta[..., SHARPNESS] = np.hypot(theta[..., SHARPNESS] * difference, 0.01)
+    # p of (1). Of a corner with .2 the slope turns over 16 octaves; wider ones, with .01, gave 2 of 16 surfaces
+    # of white noise an exponent above .08
+    difference = np.minimum(np.abs(theta[..., LONG_HURST] - theta[..., HURST]), 1.0)
+    theta[..., SHARPNESS] = np.hypot(theta[..., SHARPNESS] * difference, 0.2)
+    # a corner below half of 1 / s: an octave of waves between corner and blur shows H
     theta[..., CORNER] /= 1.0 + 2.0 * theta[..., SPREAD] * theta[..., CORNER]
     return theta
 
