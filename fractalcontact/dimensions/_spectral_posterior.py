@@ -457,8 +457,8 @@ def _theta(u: Array, fixed: Array, prior: Array) -> Array:
     for k in (SPREAD, NOISE, SHARPNESS):
         theta[..., k] = np.exp(low[k] + high[k] * u[..., k])
     theta = np.where(np.isnan(fixed), theta, fixed)
-    # p of (1). Of a corner with .2 the slope turns over 16 octaves; wider ones, with .01, gave 2 of 16 surfaces
-    # of white noise an exponent above .08
+    # p of (1). Of a corner with .2 the slope turns over 16 octaves; wider ones, with .01, gave 2 of 16
+    # surfaces of white noise an exponent above .08
     difference = np.minimum(np.abs(theta[..., LONG_HURST] - theta[..., HURST]), 1.0)
     theta[..., SHARPNESS] = np.hypot(theta[..., SHARPNESS] * difference, 0.2)
     # a corner below half of 1 / s: an octave of waves between corner and blur shows H
