@@ -276,8 +276,8 @@ def _scans(options: argparse.Namespace) -> tuple[Any, Any]:
     half = len(scans) // 2
     lower, upper = scans[:half], scans[half:]
     if len(lower) != len(upper):
-        got = f"{len(scans)} files"
-        raise InvalidInput("fractalcontact joint", [f"expected as many lower as upper faces, got {got}"])
+        expected = "as many files of lower as of upper faces"
+        raise InvalidInput("fractalcontact joint", [f"expected {expected}, got {len(scans)} in all"])
     if half == 1:
         return lower[0], upper[0]
     pairs = list(zip(lower, upper, _own_parts(lower), _own_parts(upper), strict=True))

@@ -298,6 +298,8 @@ def test_command_prints_a_row_for_each_scan_and_tells_failures_by_its_exit(tmp_p
     refused = copied_command("joint", *files, "--young", "30GPa", "-o", tmp_path / "joint")
     assert refused.returncode == 2
     assert "differ by the face alone" in refused.stderr
+    alone = copied_command("joint", files[0], "--young", "30GPa", "-o", tmp_path / "joint")
+    assert "expected as many files of lower as of upper faces, got 1 in all" in alone.stderr
 
 
 def test_jrc_below_its_scale_is_in_words_and_in_no_mean(tmp_path):
