@@ -38,7 +38,14 @@ from fractalcontact.dimensions._mode_bins import (
     single_waves,
     whitened,
 )
-from fractalcontact.dimensions._spectral_posterior import HURST, LOWEST, SPREAD, Known, posterior
+from fractalcontact.dimensions._spectral_posterior import (
+    HURST,
+    LOWEST,
+    RATIO_DEVIATION,
+    SPREAD,
+    Known,
+    posterior,
+)
 from fractalcontact.dimensions._surface_input import Surface, middle_slices
 from fractalcontact.dimensions._waves import LARGEST_CROP
 
@@ -116,7 +123,7 @@ class FirstFit:
             if is_settled or not keep.any():  # of a narrow band single waves may be all
                 break
             now = np.array([math.log(lattice.stretch), 0.0])
-            uv, _, share = log_ratio(levels, now, levels.slope(unblurred))
+            uv, _, share = log_ratio(levels, now, levels.slope(unblurred), deviation=RATIO_DEVIATION)
             stretch = math.exp(share * uv[0])
             if is_complete and lattice.stretch == stretch == 1.0:
                 break
@@ -231,12 +238,18 @@ def _tapered(heights: Array, lattice: Lattice, is_complete: bool) -> tuple[Latti
 
 
 def log_ratio(
-    levels: Levels, before: Array, slope: float, information: float = 1.0, *, rounds: int = 30
+    levels: Levels,
+    before: Array,
+    slope: float,
+    information: float = 1.0,
+    *,
+    deviation: float = math.inf,
+    rounds: int = 30,
 ) -> tuple[Array, Array, float]:
     """Return the log ratio of lengths (u, v) that levels by azimuth show.
 
     The power of waves of one length is (q' M^-1 q)^(slope / 2) of their azimuth, M being `metric_of` (u, v).
-    Gauss-Newton steps find the least chi square. Cosine modes leave v at zero.
+    Gauss-Newton steps find the least chi square, that of the prior included. Cosine modes leave v at zero.
 
     Parameters
     ----------
@@ -247,6 +260,8 @@ def log_ratio(
         Of the logarithm of the power over that of the wavenumber.
     information : float
         Of a mode.
+    deviation : float
+        Of the prior of u and v. Where the slope is small, as on a plateau, levels tell little of lengths.
     rounds : int
         Steps at most; 2 to 10 are needed. Of 64 x 64 points under a lay of 8 to 1 some do not end.
 
@@ -258,7 +273,7 @@ def log_ratio(
     share : float
         By which it is to be shrunk, as its gain in chi square is beyond chance.
     """
-    weight = information * levels.information
+    weight, prior = information * levels.information, deviation**-2.0
     known = weight > 0.0
     free = 1 + bool(np.any(levels.azimuth[known] < 0.0))
     uv, variance = before.copy(), np.zeros((2, 2))
@@ -275,13 +290,15 @@ def log_ratio(
     for _ in range(rounds):
         here = logs(uv)
         columns = np.stack([(logs(uv + move) - here) / 1e-4 for move in 1e-4 * np.eye(2)[:free]], axis=1)
-        variance[:free, :free] = np.linalg.pinv((weight[:, None] * columns).T @ columns)
-        step = variance[:, :free] @ (columns.T @ (weight * (target - here)))
+        variance[:free, :free] = np.linalg.pinv(
+            (weight[:, None] * columns).T @ columns + prior * np.eye(free)
+        )
+        step = variance[:, :free] @ (columns.T @ (weight * (target - here)) - prior * uv[:free])
         uv = uv + step / max(1.0, math.hypot(*step))
         uv = uv / max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)
         if math.hypot(*step) < 1e-4:
             break
-    gain = float(weight @ (np.square(target) - np.square(target - logs(uv))))
+    gain = float(weight @ (np.square(target) - np.square(target - logs(uv))) - prior * uv @ uv)
     return uv, variance, significant_share(gain, free)
 
 

@@ -125,6 +125,19 @@ def test_crop_of_band_limited_surface_holds_exponent():
     assert float(result.ci_low) < 0.8 < float(result.ci_high)
 
 
+def test_levels_of_a_plateau_are_no_stretch():
+    """Power hardly changes with length: levels that differ by chance gave lengths of 1 to 3, and H = .45."""
+    edge, corner = 256, 8.0
+    q = np.hypot(np.fft.fftfreq(edge)[:, None], np.fft.rfftfreq(edge))
+    q[0, 0] = np.inf
+    density = np.maximum(q, 1.0 / corner) ** -3.8 * np.isfinite(q)
+    white = np.random.default_rng([0, 8, 10009]).standard_normal((edge, edge))
+    heights = np.fft.irfft2(np.fft.rfft2(white) * np.sqrt(density))[:128, :128]
+    found = estimate_one(surface_of(1e-6 * heights, 1e-4))
+    assert found.hurst == pytest.approx(0.9, abs=0.05)
+    assert found.ci_low < 0.9 < found.ci_high
+
+
 def test_intervals_hold_with_most_points_missing():
     """The correction is repeated until it settles; after two rounds 2 of 12 held."""
     held = []
