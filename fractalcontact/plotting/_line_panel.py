@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -150,11 +151,18 @@ class LinePanel:
             self.ax.plot(*points, label=name, **({"marker": "o", "ls": ""} | style | fill))
 
     def band(self, name: str, x: Any, low: Any, high: Any, colour: Any, alpha: float = BAND_OPACITY) -> None:
-        """Fill between the ends of intervals; an outline without a point would set the limits of the axes."""
+        """Fill between the ends of intervals; an outline without a point would set the limits of the axes.
+
+        Each leg of a path that turns back has a band: an outline run through to and fro fills nothing.
+        """
         if not np.isfinite(np.add(low, high)).any():
             return
-        ends = self.y.scale(low), self.y.scale(high)
-        self.ax.fill_between(self.x.scale(x), *ends, color=colour, alpha=alpha, lw=0, label=name)
+        across, lower, upper = np.broadcast_arrays(self.x.scale(x), self.y.scale(low), self.y.scale(high))
+        turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(across))))
+        for first, last in pairwise([0, *turns.tolist(), across.size - 1]):
+            leg = slice(first, last + 1)
+            ends = lower[leg], upper[leg]
+            self.ax.fill_between(across[leg], *ends, color=colour, alpha=alpha, lw=0, label=name)
 
     def bars(self, name: str, x: Any, low: Any, high: Any, **style: Any) -> None:
         """Draw intervals as vertical bars."""

@@ -34,6 +34,24 @@ def test_null_and_interval(closed):
     assert band.max() == pytest.approx(float(high.max()))
 
 
+def test_an_interval_is_shaded_on_a_path_that_turns_back(closed):
+    """One outline, run through to and fro, encloses nothing."""
+    there_and_back = synthetic.box_dimension(closed).isel(shear=0, step=[0, 1, 2, 1])
+    (ax,) = plotting.box_dimension(there_and_back)
+    force = np.mean(ax.lines[0].get_xdata()[1:3])  # between the states that are passed twice
+    low, high = (float(there_and_back[name][1:3].mean()) for name in ("ci_low", "ci_high"))
+    bands = [path for each in ax.collections for path in each.get_paths()]
+    place = (force, (low + high) / 2)
+    assert sum(abs(_turns(path.vertices, place)) for path in bands) == 2
+    assert all(abs(_turns(path.vertices, place)) <= 1 for path in bands)
+
+
+def _turns(outline, place):
+    """Return how often an outline goes around a place."""
+    angles = np.unwrap(np.arctan2(*(outline - place).T[::-1]))
+    return round((angles[-1] - angles[0]) / (2 * np.pi))
+
+
 def test_chosen_force(closed):
     result = synthetic.box_dimension(closed)
     ax = plotting.box_dimension(result, normal_force=1e3)[1]
