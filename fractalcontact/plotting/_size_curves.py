@@ -179,10 +179,13 @@ def lacunarity(
             along = _paths.loads_of(own, name, PATH if dim == PATH[1] else PATH[::-1])
             places = Quantity(along.values[0], along.scale, along.name)
             steps = np.diff(places.values)
-            if not (np.all(steps > 0) or np.all(steps < 0)):  # cells of a path that turns back would overlap
+            is_numbered = not (np.all(steps > 0) or np.all(steps < 0))
+            if is_numbered:  # cells of a path that turns back would overlap
                 places = Quantity(np.arange(1.0 + steps.size), PLAIN, "state, in the order of the path")
             colours = quantity(path.states, "lacunarity", (dim, "box_size"))
             _maps.draw_heat_map(ax, places, sizes_of(path.states, "box_size"), colours)
+            if is_numbered:
+                ax.xaxis.get_major_locator().set_params(integer=True)
             ax.set_title(path.common)
         return shown
     panels, names = (dims, shown), ("lacunarity", "")

@@ -230,6 +230,9 @@ def test_heat_maps_of_lacunarity_have_the_values_and_edges():
     (ax,) = plotting.lacunarity(unloaded, maps=True)
     assert ax.get_xlabel() == "state, in the order of the path"
     np.testing.assert_array_equal(ax.collections[0].get_coordinates()[0, :, 0], np.arange(-0.5, 4))
+    ax.figure.draw_without_rendering()
+    numbers = [tick for tick in ax.get_xticks() if -0.5 <= tick <= 3.5]
+    assert numbers == [0, 1, 2, 3]  # there is no state 0.5
 
 
 def test_a_study_draws_its_evolution(measured, tmp_path):
