@@ -258,15 +258,16 @@ def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> Non
 
 
 def _check_material(scene: Scene, pressing: Sequence[StageType], problems: Problems) -> None:
-    """Check that the material has the constants of the stages that press, and none that they refuse."""
+    """Check that stages that press have their constants, and no hardness where one refuses it."""
     material = scene.table("material")
     is_elastic = bool({"young", "poisson"} & set(material))
     if any(row.takes == "crack" and (is_elastic or not row.may_be_rigid) for row in pressing):
         for key in ("young", "poisson"):
             problems.require(key in material, f"material.{key}", "a value", NONE)
-    if any(row.refuses_hardness for row in pressing):
+    shared = {row.table.partition(".")[0] for row in pressing if row.refuses_hardness}
+    for name in ["material", *sorted(shared)] if shared else []:
         expected = "no hardness: partial slip is that of elastic bodies"
-        problems.require("hardness" not in material, "material.hardness", expected, "a value")
+        problems.require("hardness" not in scene.table(name), f"{name}.hardness", expected, "a value")
 
 
 def _check_arguments(scene: Scene, stage: Stage, problems: Problems) -> None:
