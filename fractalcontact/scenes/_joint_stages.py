@@ -206,8 +206,7 @@ def _weight_strength(state: xr.Dataset) -> Any:
 def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the transmissivity in m3, and for water in the unit of hydrogeology."""
     values = finite(last["transmissivity"])
-    values = values[values > 0]
-    if values.size:
+    if values.any():
         ends = (float(values.min()), float(values.max()))
         of_water = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight over viscosity, at 20 °C
         cubes, water = (

@@ -242,6 +242,15 @@ def test_transmissivity_of_parallel_plates_in_two_units():
     assert "for water at 20 °C, 8.14e-07 m²/s" in text
 
 
+def test_transmissivities_of_several_shears_reach_down_to_a_closed_one():
+    gap = fc.surfaces.from_array(np.full((8, 8), 1e-4), 1e-3).expand_dims(shear=[0.0, 1e-3], step=[0])
+    opening = xr.DataArray([0.0, 1.0], dims="shear")  # the first of the two is closed
+    flow = fc.joints.transmissivity(gap * opening)
+    text = remarks(xr.DataTree.from_dict({"joints/transmissivity": flow}))
+    assert "cubed over 12: 0 to 8.33e-14 m³" in text
+    assert "for water at 20 °C, 0 to 8.14e-07 m²/s" in text
+
+
 def test_small_forces_are_not_zero_kilonewton():
     face = fc.surfaces.fbm((32, 32), 1e-7, hurst=0.8, rms_increment=3e-9, rng=1)
     crack = fc.joints.Crack(face, young=30e9, poisson=0.2, block=16e-7)
