@@ -313,8 +313,8 @@ def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.
     levelled = fc.surfaces.level(profile, level) if level else profile
     groups = {
         "/surfaces": levelled.to_dataset(name="height"),
-        "/dimensions": fc.dimensions.estimate(profile),
-        "/joints/roughness_coefficient": fc.joints.roughness_coefficient(profile),
+        "/dimensions": fc.dimensions.estimate(levelled),
+        "/joints/roughness_coefficient": fc.joints.roughness_coefficient(levelled),
     }
     tree = xr.DataTree.from_dict(groups)
     tree.attrs["title"] = title

@@ -27,8 +27,8 @@ def _check_size(problems: Problems) -> None:
     given = problems.given
     problems.number("threshold", above=0)
     largest = None
-    if check_stack(problems, smallest=3, is_map=True):
-        largest = min(read_grid(given.surface).shape)
+    if check_stack(problems, smallest=3, is_one=True):
+        largest = min(given.surface.shape)
         problems.require(bool(np.isfinite(given.surface.values).any()), "surface", "heights", NONE)
     if problems.integer("size", at_least=3, at_most=largest):
         problems.require(given.size % 2 == 1, "size", "an odd number of cells")
@@ -50,15 +50,15 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, size: int = 5) -> 
 
     Parameters
     ----------
-    surface : DataArray, dims (y, x)
+    surface : DataArray, dims (y, x) or (x,)
         Heights in metres; missing ones (NaN) stay missing.
     threshold : float
         Largest distance of a height from the median around it, in robust standard deviations of that
         distance over the whole surface. A sharp edge of a rough surface may exceed it too: look at the
         removed points, and test whether the results depend on them.
     size : int
-        Odd edge, in cells, of the square whose median is taken; 3 or more. It removes spikes up to half as
-        wide.
+        Odd edge, in cells, of the square whose median is taken, of a profile the interval; 3 or more. It
+        removes spikes up to half as wide; the ends of a profile stay.
 
     Returns
     -------
@@ -69,7 +69,7 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, size: int = 5) -> 
     Raises
     ------
     InvalidInput
-        The surface is not a plane of heights, or an argument is wrong.
+        The surface is no single plane or profile of heights, or an argument is wrong.
 
     References
     ----------
@@ -84,7 +84,7 @@ def despike(surface: xr.DataArray, *, threshold: float = 6.0, size: int = 5) -> 
     >>> int(clean.removed_points), bool(clean[20, 30].isnull())
     (1, True)
     """
-    heights = np.asarray(surface.values, dtype=np.float64)
+    heights = np.atleast_2d(np.asarray(surface.values, dtype=np.float64))
     is_spike, deviation = _spikes(heights, int(size), float(threshold))
     count = int(is_spike.sum())
     result = with_heights(surface, np.where(is_spike, np.nan, heights)).assign_coords(removed_points=count)

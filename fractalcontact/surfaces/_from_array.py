@@ -271,10 +271,9 @@ def draw_ensemble(
     return surface
 
 
-def check_stack(problems: Problems, *, smallest: int = 2, is_map: bool = False) -> bool:
-    """Check for planes or profiles, or for one map, of heights that may be missing (NaN) but not infinite."""
-    several = not is_map
-    if not problems.surface("surface", finite=False, smallest=smallest, leading=several, profile=several):
+def check_stack(problems: Problems, *, smallest: int = 2, is_one: bool = False) -> bool:
+    """Check for planes or profiles, or for one, of heights that may be missing (NaN) but not infinite."""
+    if not problems.surface("surface", finite=False, smallest=smallest, leading=not is_one, profile=True):
         return False
     return problems.not_infinite("surface", problems.given.surface.values)
 

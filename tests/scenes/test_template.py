@@ -58,7 +58,7 @@ def test_roughness_of_a_profile(scans, capsys):
     assert main(["roughness", "line.csv", "--units", "m"]) == 0
     text = capsys.readouterr().out
     result = fc.open(scans / "line_roughness" / "result.nc")
-    read = fc.surfaces.read("line.csv", units="m")
+    read = fc.surfaces.level(fc.surfaces.read("line.csv", units="m"))
     expected = fc.joints.roughness_coefficient(read)
     assert result["joints/roughness_coefficient"].to_dataset().profile_slope.equals(expected.profile_slope)
     dimension = fc.dimensions.estimate(read).fractal_dimension
@@ -68,6 +68,23 @@ def test_roughness_of_a_profile(scans, capsys):
     assert f"{float(dimension[0]):.3f}" in text
     assert main(["roughness", "lower.nc", "--quiet", "-o", "other"]) == 0
     assert main(["roughness", "line.csv", "--units", "m", "-o", "other"]) == 2
+
+
+def test_options_of_a_profile_act_on_its_numbers(scans):
+    """A bow that `--level 2` removes, and a spike that `--despike` does, are in neither dimension nor Z2."""
+    profile = fc.surfaces.fbm(512, 2e-4, hurst=HURST, rms_increment=3e-5, rng=3)
+    bent = profile + 2.0 * (profile.x - profile.x.mean()) ** 2
+    bent[200] += 3e-3
+    np.savetxt("bent.csv", np.stack([bent.x, bent.values], axis=-1), delimiter=",", header="x,z")
+    assert main(["roughness", "bent.csv", "--units", "m", "--level", "2", "--despike", "--quiet"]) == 0
+    result = fc.open(scans / "bent_roughness" / "result.nc")
+    assert result["surfaces"]["height"].isnull().values.nonzero()[0].tolist() == [200]
+    straight = fc.surfaces.level(profile.where(bent != bent[200]), 2)
+    slope = result["joints/roughness_coefficient"]["profile_slope"].values
+    expected = fc.joints.roughness_coefficient(straight).profile_slope.values
+    np.testing.assert_allclose(slope, expected, rtol=1e-9)
+    fitted = result["dimensions"]["hurst"].values
+    np.testing.assert_allclose(fitted, fc.dimensions.estimate(straight).hurst.values, rtol=1e-6)
 
 
 def test_printed_scene_is_the_one_that_runs(scans, capsys):

@@ -45,6 +45,19 @@ def test_slope_is_not_removed_and_units_do_not_matter(surface):
     assert fc.surfaces.despike(flat).removed_points == 0
 
 
+def test_profile():
+    profile = fc.surfaces.fbm(512, 1e-5, hurst=0.7, rms_increment=1e-6, rng=1)
+    assert fc.surfaces.despike(profile).removed_points == 0
+    spiked = profile.copy()
+    spiked[[1, 200, 201]] += 1e-4
+    clean = fc.surfaces.despike(spiked)
+    assert clean.dims == ("x",)
+    assert np.flatnonzero(clean.isnull()).tolist() == [1, 200, 201]
+    np.testing.assert_array_equal(clean.fillna(profile), profile)
+    with pytest.raises(ValueError, match="size: expected an integer >= 3 and <= 512"):
+        fc.surfaces.despike(spiked, size=513)
+
+
 def test_invalid_arguments_are_refused(surface):
     with pytest.raises(ValueError, match=r"(?s)threshold.*size"):
         fc.surfaces.despike(surface, threshold=0.0, size=4)
