@@ -255,7 +255,9 @@ def _along_shear(data: xr.Dataset) -> Any:
 
 _last_domains = _paths.at_end(contact_domains, "shear")
 FIGURES = (
-    StudyFigure("surface", "surfaces", "height", _surface, beside={"delta": "joints/delta_surface"}),
+    StudyFigure(
+        "surface", "surfaces", "height", _surface, ("y", "x"), beside={"delta": "joints/delta_surface"}
+    ),
     StudyFigure("delta_surface", "joints/delta_surface", "height", _delta_surface),
     StudyFigure("joint_contact_domains", "joints/closure", "state", _along_load),
     StudyFigure("joint_contact_domains_along_shear", "joints/closure", "state", _along_shear, _paths.PATH),

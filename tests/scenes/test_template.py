@@ -66,6 +66,8 @@ def test_roughness_of_a_profile(scans, capsys):
         assert name in text
         assert f"{float(number[0]):.{1 if name == 'JRC' else 3}f}" in text
     assert f"{float(dimension[0]):.3f}" in text
+    assert main(["report", "line_roughness/result.nc", "--csv", "tables"]) == 0
+    assert "surfaces_by_x.csv" in {path.name for path in (scans / "tables").iterdir()}
     assert main(["roughness", "lower.nc", "--quiet", "-o", "other"]) == 0
     assert main(["roughness", "line.csv", "--units", "m", "-o", "other"]) == 2
 
