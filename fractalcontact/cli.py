@@ -31,6 +31,7 @@ TEMPLATE_ARGUMENTS = (  # of `scenes.template`; options of these names give them
     "spacing", "units", "level", "despike", "young", "poisson", "register", "turn_upper", "friction_angle",
     "wall_strength",
 )  # fmt: skip
+ESTIMATOR_OPTIONS = ("hurst", "sizes", "families", "methods", "members", "seed")  # of `accuracy estimators`
 HELP = {  # of options, where it is long
     "run folder": "folder for result.nc, the report and the figures (default: the name of the scene); a "
     "stopped run resumes there",
@@ -131,7 +132,7 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
     accuracy.add_argument("names", nargs="*", metavar="NAME", help=HELP["benchmarks"])
     accuracy.add_argument("-o", "--out", help=HELP["accuracy folder"])
-    accuracy.add_argument("--budget", type=float, default=60.0, help="time budget in seconds (default 60)")
+    accuracy.add_argument("--budget", type=float, help="time budget of benchmarks in seconds (default 60)")
     add = accuracy.add_argument_group("estimators").add_argument
     add("--hurst", type=float, nargs="+", help="exponents (default .1 .3 .5 .7 .9)")
     add("--sizes", type=int, nargs="+", help="points along an edge (default 64 256 1024)")
@@ -394,12 +395,21 @@ def _client(address: str | None) -> Iterator[Any]:
 
 
 def _accuracy(options: argparse.Namespace) -> int:
+    from fractalcontact.base.validation import Problems
+
+    measures_estimators = options.names == ["estimators"]
+    others, place = (("budget",), "with") if measures_estimators else (ESTIMATOR_OPTIONS, "except with")
+    with Problems("fractalcontact accuracy") as problems:
+        for name in others:
+            value = getattr(options, name)
+            problems.require(value is None, f"--{name}", f"no value {place} `estimators`", value)
     if options.out is not None:
         files.output_folder(options.out)  # before the measuring, not after it
-    if options.names == ["estimators"]:
+    if measures_estimators:
         return _estimators(options)
+    budget = {} if options.budget is None else {"budget": options.budget}
     with noted() as stop:
-        result = fc.accuracy.measure(options.names or None, budget=options.budget, progress=True, stop=stop)
+        result = fc.accuracy.measure(options.names or None, **budget, progress=True, stop=stop)
     print(fc.accuracy.summary(result))
     if options.out is not None:
         written = [_save_accuracy(result, Path(options.out) / "accuracy.nc", stop)]
@@ -427,10 +437,11 @@ def _save_accuracy(result: Any, target: Path, stop: Stop) -> str:
 
 
 def _estimators(options: argparse.Namespace) -> int:
-    names = ("hurst", "sizes", "families", "methods", "members")
-    arguments = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+    given = {name: getattr(options, name) for name in ESTIMATOR_OPTIONS}
+    arguments = {name: value for name, value in given.items() if value is not None}
+    seed = arguments.pop("seed", None)
     file = None if options.out is None else Path(options.out) / "estimators.nc"
-    result = fc.accuracy.estimators(**arguments, rng=options.seed, file=file, progress=True)
+    result = fc.accuracy.estimators(**arguments, rng=seed, file=file, progress=True)
     print(fc.accuracy.summary(result))
     if file is not None:
         _write_figure(result, file.with_suffix(".png"))

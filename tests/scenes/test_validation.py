@@ -10,6 +10,7 @@ from study import SOUND, command, command_here, watch_calls
 
 import fractalcontact as fc
 from fractalcontact.base.errors import InvalidInput
+from fractalcontact.cli import main
 
 
 @pytest.mark.parametrize(
@@ -75,6 +76,19 @@ def test_accuracy_refuses_an_unwritable_folder_first(tmp_path):
     done = command_here("accuracy", "-o", tmp_path / "out")
     assert done.returncode == 2
     assert "expected a folder" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "refused"),
+    [
+        (("contact", "--hurst", "0.5", "--seed", "3"), ["--hurst", "--seed"]),
+        (("--members", "8"), ["--members"]),
+        (("estimators", "--budget", "3"), ["--budget"]),
+    ],
+)
+def test_accuracy_refuses_options_without_effect(words, refused, capsys):
+    assert main(["accuracy", *words]) == 2
+    assert re.findall(r"- (--\w+): expected no value", capsys.readouterr().err) == refused
 
 
 def test_command_reports_file_size_and_peak_memory(tmp_path):
