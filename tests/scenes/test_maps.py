@@ -90,6 +90,9 @@ def test_command_writes_the_maps_of_a_study(closure, tmp_path):
     assert again.returncode == 2
     assert "files of these names" in again.stderr
     assert command_here("export", result, "--to", "tiff", "--force").returncode == 0
+    single = fc.save(closure[["gap"]], tmp_path / "gap.nc")
+    done = command_here("export", single, "--to", "tiff", "--force")
+    assert done.stdout.endswith("maps: 1 file, result_gap.tif\n")
 
 
 def test_curves_alone_are_refused(closure, tmp_path):
