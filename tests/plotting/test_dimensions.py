@@ -37,12 +37,13 @@ def test_curve_window_and_slope():
         assert name.replace("_", " ") == ax.get_title(loc="left")
 
 
-def test_profile_panels_and_tick_labels():
-    profile = fc.surfaces.fbm(200, 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+@pytest.mark.parametrize("shape", [200, (96, 128)])  # of the second, up to 31400 rad/m
+def test_panels_and_tick_labels_of_profiles_and_surfaces(shape):
+    heights = fc.surfaces.fbm(shape, 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
     names = ("spectrum", "variogram", "roughness_length", "variation", "cube_counts", "covering")
-    curves = {name: getattr(fc.dimensions, name)(profile) for name in names}
+    curves = {name: getattr(fc.dimensions, name)(heights) for name in names}
     figure = figure_of(
-        plotting.plot(curves, "dimension_curves", estimates=fc.dimensions.estimate(profile, list(names)))
+        plotting.plot(curves, "dimension_curves", estimates=fc.dimensions.estimate(heights, list(names)))
     )
     titles = {ax.get_title(loc="left") for ax in figure.axes}
     assert titles >= {name.replace("_", " ") for name in names}
