@@ -166,10 +166,15 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
 
 
 def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
-    """Return the value of a dim that names a row: a length in the unit of its column, a load, or a word."""
+    """Return the value of a dim that names a row: a length in the unit of its column, a load, or a word.
+
+    A load that no force balances, that of a periodic body beyond full contact, has the closure in its place.
+    """
     if dim == "step":
         if rows.load not in state.variables:
             return str(int(state["step"])) if "step" in state.coords else ""
+        if "closure" in state.variables and not np.isfinite(state[rows.load].values).any():
+            return f"closure {amount(state['closure'])}"
         return amount(state[rows.load], scale=column_scale(data[rows.load]))
     if dim not in state.coords:
         return ""

@@ -8,6 +8,7 @@ import xarray as xr
 from study import SOUND, command_here
 
 import fractalcontact as fc
+from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.file_contents import file_contents
 from fractalcontact.base.units import quantity_text, scale_for
 from fractalcontact.scenes._result_tables import amount
@@ -231,6 +232,20 @@ def test_column_has_one_unit_within_three_decades():
         pressed = fc.contact.press(surface, contact_modulus=1e9, nominal_pressure=pressures)
         tree = xr.DataTree.from_dict({"contact": pressed})
         assert [cells["nominal pressure"] for cells in rows(tree, "contact")] == shown
+
+
+def test_states_whose_force_is_not_determined_are_named_by_their_closure():
+    surface = fc.surfaces.spectral((32, 32), 1e-7, hurst=0.8, rms_slope=0.1, rng=1)
+    most = float(surface.max() - surface.mean())
+    with pytest.warns(ConvergenceWarning):
+        pressed = fc.contact.press(surface, contact_modulus=1e9, closure=[0.5 * most, 1.5 * most, 2 * most])
+    tree = xr.DataTree.from_dict(
+        {"contact": pressed, "domains/islands": fc.domains.islands(pressed["state"])}
+    )
+    for title in ("contact", "islands"):
+        first, *beyond = (cells["nominal pressure"] for cells in rows(tree, title))
+        assert first.endswith("Pa")
+        assert beyond == [f"closure {1e9 * factor * most:.3g} nm" for factor in (1.5, 2)]
 
 
 def test_transmissivity_of_parallel_plates_in_two_units():
