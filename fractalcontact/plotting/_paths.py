@@ -39,14 +39,16 @@ def force_of(data: xr.Dataset) -> str:
 def _loads_in_order(data: xr.Dataset) -> list[str]:
     """Return the names of loads, of force and pressure the one first that was prescribed.
 
-    A result states it in its provenance; a variable taken out of one has it as an index.
+    A result states it in its provenance; a variable taken out of one has it as an index. Last are those that
+    are not known at all steps: of a body that is closed beyond full contact the closure alone is.
     """
     stated = [
         stated_argument(provenance_of(data), FORCES),
         *(name for name in FORCES if name in data.xindexes),
     ]
     prescribed = next(filter(None, stated), FORCES[0])
-    return list(dict.fromkeys(["tangential_force", prescribed, *LOADS]))
+    names = dict.fromkeys(["tangential_force", prescribed, *LOADS])
+    return sorted(names, key=lambda name: name in data.variables and bool(data[name].isnull().any()))
 
 
 def loads_of(data: xr.Dataset, against: str, dims: tuple[str, str] = PATH) -> Quantity:
@@ -98,7 +100,7 @@ def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
             continue
         values = np.atleast_1d(state[name].values).ravel()
         # half a unit of the third digit, the last that the text has, is no difference
-        if values.size == 0 or np.ptp(values) > 5e-3 * abs(values[0]):
+        if values.size == 0 or not np.ptp(values) <= 5e-3 * abs(values[0]):
             continue
         scale = scale_of((state if path is None else path)[name])
         return f"{LOADS[name]} = {float(scale(values[0])):.3g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
@@ -199,7 +201,7 @@ def loaded_steps(path: xr.Dataset, most: int) -> list[int]:
     """Return the steps of one path to show: loaded steps, spread evenly over the closure."""
     steps = np.arange(path.sizes["step"])
     if "normal_force" in path.variables and "step" in path["normal_force"].dims:
-        loaded = steps[table(path, "normal_force", ("step",)) > 0]
+        loaded = steps[~(table(path, "normal_force", ("step",)) <= 0)]  # NaN beyond full contact
         steps = loaded if loaded.size else steps
     evenly_numbered = [int(steps[i]) for i in spread_indices(len(steps), most)]
     if len(steps) <= most or "closure" not in path.variables or path["closure"].dims != ("step",):

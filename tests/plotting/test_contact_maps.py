@@ -1,13 +1,16 @@
 """Maps of the contact state: every cell in its place, the right way up, in the right colour."""
 
+import re
+
 import numpy as np
 import plotting_synthetic as synthetic
 import pytest
 import xarray as xr
 from plotting_figures import CONTACT, OPEN, YIELDED, colours, figure_of, render
 
+import fractalcontact as fc
 from fractalcontact import plotting
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import ConvergenceWarning, InvalidInput
 from fractalcontact.base.schema import label
 
 
@@ -132,3 +135,19 @@ def test_only_maps_of_small_cells_are_magnified():
     assert len(plotting.plot(speckled(240, 0), "contact_domains")) == 2
     assert len(plotting.plot(speckled(240, 0), "contact_domains", zoom=0)) == 1
     assert len(plotting.plot(speckled(24, 0), "contact_domains")) == 1
+
+
+def test_states_beyond_full_contact_are_shown_by_their_closure():
+    """No force is determined there: it named maps `F = nan N`, and cells that touch then never touched."""
+    heights = fc.surfaces.spectral((32, 32), 1e-6, hurst=0.8, rms_slope=0.1, rng=1)
+    closures = [0.3e-6, 4e-6, 5e-6]
+    with pytest.warns(ConvergenceWarning):
+        pressed = fc.contact.press(heights, contact_modulus=1e9, closure=closures)
+    ax = plotting.plot(pressed, "first_contact")
+    assert ax.figure.axes[1].get_ylabel() == "closure $w$ of first contact (µm)"
+    assert not np.all(colours(ax) == OPEN, axis=-1).any()
+    titles = [panel.get_title(loc="left") for panel in plotting.plot(pressed, "contact_domains")]
+    assert [re.findall(r"= (\S+) µm", title)[0] for title in titles] == ["0.3", "4", "5"]
+    shown = plotting.islands(fc.domains.islands(pressed["state"]))
+    assert "$w$ = 5 µm" in shown[0].get_title(loc="left")
+    assert plotting.path(pressed, "contact_fraction").get_xlabel() == "closure $w$ (µm)"
