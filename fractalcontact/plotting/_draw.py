@@ -48,15 +48,15 @@ FIGURES = tuple(row for module in MODULES for row in module.FIGURES)
 # of files: what the labels of their axes do not say
 CAPTIONS = {
     "alluvial": "how islands grow and merge",
-    "contact_domains": "where the surface is in contact, as the load grows",
+    "contact_domains": "where the surface is in contact, along the path of load",
     "delta_surface": "of the upper face over the lower one",
     "dimension_curves": "the curves that dimensions are fitted to",
     "dimensions": "of each method, with its 95 % interval",
     "directional_roughness": "roughness metric and mean dip over the direction of shear",
     "islands": "map of the islands of contact",
     "joint_closure": "letters mark the states of the maps",
-    "joint_contact_domains": "where the faces are in contact, as the load grows",
-    "joint_contact_domains_along_shear": "where the faces are in contact, as the shear grows",
+    "joint_contact_domains": "where the faces are in contact, along the path of load",
+    "joint_contact_domains_along_shear": "where the faces are in contact, from shear to shear",
     "joint_slip_domains": "where the contact sticks and slips",
     "scans": "a row for each scan",
     "slip_domains": "where the contact sticks and slips",

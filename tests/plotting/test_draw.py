@@ -178,4 +178,5 @@ def test_every_file_says_what_it_shows(study, tmp_path):
     assert all(captions.values())
     assert captions["joint_closure"].startswith("normal force F against closure; ")
     assert captions["surface"] == "map of the height"
+    assert "along the path of load" in captions["joint_contact_domains"]  # which may turn back
     assert not any("(" in caption for caption in captions.values())  # no units
