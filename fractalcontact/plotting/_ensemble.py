@@ -16,7 +16,7 @@ from fractalcontact.base.validation import require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import result_of
-from fractalcontact.plotting._line_panel import BAND_OPACITY, LinePanel
+from fractalcontact.plotting._line_panel import BAND_OPACITY, LinePanel, legs
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
 from fractalcontact.plotting._units import PLAIN, Quantity, Units
 
@@ -87,11 +87,13 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
         if np.allclose(x_low, x_high, atol=0) and np.allclose(y_low, y_high, atol=0):  # no band to be seen
             continue
         finite = np.isfinite(x_low + y_low + x_high + y_high)
-        x = np.concatenate([x_low[finite], x_high[finite][::-1]])
-        y = np.concatenate([y_low[finite], y_high[finite][::-1]])
+        x, y = np.array([x_low, x_high])[:, finite], np.array([y_low, y_high])[:, finite]
         name = str(line.get_label())
-        label = name if name.startswith("_") else f"{name}, central 68 %"
-        ax.fill(x, y, color=line.get_color(), alpha=BAND_OPACITY, linewidth=0, zorder=0.5, label=label)
+        style = {"color": line.get_color(), "alpha": BAND_OPACITY, "linewidth": 0, "zorder": 0.5}
+        style["label"] = name if name.startswith("_") else f"{name}, central 68 %"
+        for leg in legs(x[0]):
+            outline = (np.concatenate([low[leg], high[leg][::-1]]) for low, high in (x, y))
+            ax.fill(*outline, **style)
         limits = _widened(limits[0], x, ax.get_xscale()), _widened(limits[1], y, ax.get_yscale())
         count += 1
     if count:

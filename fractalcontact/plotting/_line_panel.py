@@ -158,9 +158,7 @@ class LinePanel:
         if not np.isfinite(np.add(low, high)).any():
             return
         across, lower, upper = np.broadcast_arrays(self.x.scale(x), self.y.scale(low), self.y.scale(high))
-        turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(across))))
-        for first, last in pairwise([0, *turns.tolist(), across.size - 1]):
-            leg = slice(first, last + 1)
+        for leg in legs(across):
             ends = lower[leg], upper[leg]
             self.ax.fill_between(across[leg], *ends, color=colour, alpha=alpha, lw=0, label=name)
 
@@ -245,6 +243,14 @@ class LinePanel:
         own = self.family.legend()
         _style.side_legend(ax or self.ax, own, title=self.family.title)
         _style.side_legend(ax or self.ax, self.entries, title=title, low=bool(own))
+
+
+def legs(x: Array) -> list[slice]:
+    """Return the parts of a path between the points at which it turns back, which both have."""
+    ways = np.sign(np.diff(x))
+    moves = np.flatnonzero(ways)  # a pause is no turn
+    turns = moves[1:][ways[moves[1:]] != ways[moves[:-1]]]
+    return [slice(first, last + 1) for first, last in pairwise([0, *turns.tolist(), x.size - 1])]
 
 
 def _isolated_points(x: Array, y: Array) -> dict[str, Any]:

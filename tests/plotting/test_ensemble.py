@@ -74,6 +74,16 @@ def test_curves_are_the_median_bands_the_quantiles_and_maps_name_their_member(dr
     np.testing.assert_allclose(corners[3:6], np.column_stack([FORCES, high * FORCES])[::-1])
 
 
+def test_bands_of_a_path_that_turns_back_are_those_of_its_legs(drawn):
+    """An outline that is run through to and fro encloses nothing."""
+    tree = study(FACTORS)
+    back = xr.DataTree.from_dict({"contact": tree["contact"].to_dataset().isel(step=[0, 1, 2, 1, 0])})
+    (one, other), legs = drawn(tree)["contact_area"][1], drawn(back)["contact_area"][1]
+    assert len(legs) == 4
+    for leg, there in zip(legs, (one, one, other, other), strict=True):
+        np.testing.assert_allclose(np.unique(leg, axis=0), np.unique(there, axis=0))
+
+
 def test_band_has_the_unit_of_the_axis(drawn):
     # closures from nanometres to hundreds of micrometres: each alone would have another prefix
     curves, bands, _ = drawn(study(np.array([1e-4, 1.0, 1e3])))["closure_law"]
