@@ -67,7 +67,8 @@ def draw_with_band(drawings: Sequence[Callable[[], Any]], members: int) -> Axes:
         words.append(f"maps: member 0 of {members}" if bands else f"member 0 of {members}")
     if not words:
         words = [f"median of {members} members"]
-    figure.supxlabel("; ".join(words), x=0.99, ha="right", fontsize="small", color=_style.grey())
+    # the legend of flags stands at the right
+    figure.supxlabel("; ".join(words), x=0.01, ha="left", fontsize="small", color=_style.grey())
     return figure.axes[0]
 
 

@@ -1,5 +1,7 @@
 """Figures of an ensemble: median and quantiles of the members, and words that say so."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -26,7 +28,10 @@ def drawn(monkeypatch, tmp_path):
             bands = [patch.get_xy() for ax in figure.axes for patch in ax.patches if hasattr(patch, "get_xy")]
             words = figure._supxlabel.get_text() if figure._supxlabel else ""
             shown[name] = curves, [np.asarray(band) for band in bands if np.ndim(band) == 2], words
-            return print_png(canvas, target, *arguments, **options)
+            print_png(canvas, target, *arguments, **options)
+            below = [*figure.legends, figure._supxlabel] if words else []
+            boxes = [each.get_window_extent() for each in below]
+            assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
 
         monkeypatch.setattr(FigureCanvasAgg, "print_png", record)
         fc.plotting.draw(tree, tmp_path)
@@ -72,6 +77,12 @@ def test_curves_are_the_median_bands_the_quantiles_and_maps_name_their_member(dr
     corners = max(bands, key=lambda band: band[:, 1].max())
     np.testing.assert_allclose(corners[:3], np.column_stack([FORCES, low * FORCES]))
     np.testing.assert_allclose(corners[3:6], np.column_stack([FORCES, high * FORCES])[::-1])
+
+
+def test_maps_name_their_member_beside_the_colours_of_their_flags(drawn):
+    tree = study(FACTORS)
+    tree["contact/state"].values[:, 2, 0, 0] = 2  # yielded: the flags have a legend below the maps
+    assert drawn(tree)["contact_domains"][2] == "member 0 of 5"
 
 
 def test_bands_of_a_path_that_turns_back_are_those_of_its_legs(drawn):
