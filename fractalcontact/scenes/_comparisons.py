@@ -31,7 +31,8 @@ def _spikes(tree: xr.DataTree) -> str:
         data, table = group_of(tree, path), scene_table(tree, name)
         height = None if data is None else data.get("height")
         is_scan = bool({"read", "sample"} & table.keys()) and not table.get("despike")
-        if is_scan and height is not None and height.ndim == 2 and min(height.shape) >= 3:
+        # the square whose median is taken has five points along an edge
+        if is_scan and height is not None and height.ndim == 2 and min(height.shape) >= 5:
             clean[name] = public_function("surfaces.despike")(height)
     counts = {name: int(each["removed_points"]) for name, each in clean.items() if each["removed_points"]}
     effects = list(_without_spikes(tree, clean["surface"])) if "surface" in counts else []

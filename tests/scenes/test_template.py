@@ -72,6 +72,14 @@ def test_roughness_of_a_profile(scans, capsys):
     assert main(["roughness", "line.csv", "--units", "m", "-o", "other"]) == 2
 
 
+def test_scan_smaller_than_the_square_of_the_spikes(scans, capsys):
+    """Its spikes are not looked for: the run failed at its end, and named a size that nobody gave."""
+    fc.save(fc.open("lower.nc").isel(y=slice(4), x=slice(4)), "small.nc")
+    for words in (["roughness"], ["contact", "--young", "3GPa"]):
+        assert main([words[0], "small.nc", *words[1:], "-o", words[0], "--quiet"]) == 0
+        assert "size" not in capsys.readouterr().err
+
+
 def test_options_of_a_profile_act_on_its_numbers(scans):
     """A bow that `--level 2` removes, and a spike that `--despike` does, are in neither dimension nor Z2."""
     profile = fc.surfaces.fbm(512, 2e-4, hurst=HURST, rms_increment=3e-5, rng=3)
