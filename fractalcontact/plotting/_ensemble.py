@@ -77,9 +77,10 @@ def _add_bands(ax: Axes, low: Axes, high: Axes) -> int:
     count, limits = 0, (ax.get_xlim(), ax.get_ylim())
     lines = [[line for line in each.get_lines() if line.get_transform() == each.transData]
              for each in (ax, low, high)]  # fmt: skip
-    if len({len(group) for group in lines}) > 1:
-        return 0
-    for line, *bounds in zip(*lines, strict=True):
+    # lines of reference, such as that of logarithmic axes, are drawn last, and not in all three drawings
+    for line, *bounds in zip(*lines, strict=False):
+        if len({str(each.get_label()).split(",")[0] for each in (line, *bounds)}) > 1:
+            continue
         (x_low, y_low), (x_high, y_high) = (
             _in_units_of(ax, bound, drawn) for bound, drawn in zip((low, high), bounds, strict=True)
         )

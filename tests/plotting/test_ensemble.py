@@ -95,6 +95,17 @@ def test_bands_of_a_path_that_turns_back_are_those_of_its_legs(drawn):
         np.testing.assert_allclose(np.unique(leg, axis=0), np.unique(there, axis=0))
 
 
+def test_bands_do_not_need_the_same_lines_of_reference(drawn):
+    """The forces of a high quantile may need logarithmic axes, where those of the median do not."""
+    pressed = study(FACTORS)["contact"].to_dataset()
+    force = np.tile(FORCES, (FACTORS.size, 1))
+    force[-1, -1] = 400
+    loaded = pressed.assign_coords(normal_force=(("member", "step"), force, {"units": "N"}))
+    curves, bands, words = drawn(xr.DataTree.from_dict({"contact": loaded}))["contact_area"]
+    assert len(curves) == len(bands) == 2
+    assert words == "curves: median, band: central 68 % of 5 members"
+
+
 def test_band_has_the_unit_of_the_axis(drawn):
     # closures from nanometres to hundreds of micrometres: each alone would have another prefix
     curves, bands, _ = drawn(study(np.array([1e-4, 1.0, 1e3])))["closure_law"]
