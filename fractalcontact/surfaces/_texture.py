@@ -152,7 +152,9 @@ def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle
     number = 2 + int(per_point * longest * max(map(abs, unit)))
     distance = np.linspace(0.0, longest, number)
     places = [lag + u * distance for lag, u in zip(reach, unit, strict=True)]
-    coarse = map_coordinates(acf, places, order=1)
+    coarse = map_coordinates(
+        acf, places, order=1, mode="nearest"
+    )  # the last place is on the edge, to rounding
     below = np.flatnonzero(coarse <= DECAY)
     if not below.size:
         return math.nan

@@ -106,3 +106,16 @@ def test_constant_and_empty_surfaces_have_a_reason():
     empty = fc.surfaces.texture(surface_of(np.full((8, 8), np.nan)))
     assert np.isnan(empty.core_height)
     assert "observed" in empty.core_height.attrs["reason"]
+
+
+def two_waves(ny, nx):
+    """Waves of 120 points along y and of 300 along x: rays across a narrow strip end before they fall."""
+    waves = (np.cos(2 * np.pi * np.arange(n) / period) for n, period in ((ny, 120), (nx, 300)))
+    return np.add.outer(*waves)
+
+
+def test_a_ray_that_ends_at_the_edge_has_not_fallen():
+    """Rounding puts the end of a ray beyond the last lag, where the correlation is not zero."""
+    strip = two_waves(40, 800)
+    lengths = [fc.surfaces.texture(surface_of(z)).autocorrelation_length for z in (strip, strip.T)]
+    np.testing.assert_allclose(*map(float, lengths), rtol=1e-9)
