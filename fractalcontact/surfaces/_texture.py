@@ -63,7 +63,7 @@ def texture(surface: xr.DataArray) -> xr.Dataset:
         Over the leading dims, if there are any (symbols of ISO 25178-2 in brackets):
 
         - autocorrelation_length (Sal, m): the shortest distance at which the autocorrelation of the heights
-          about their mean has fallen to 0.2
+          about their mean has fallen to 0.2; NaN if a direction along which it has not ends before that
         - texture_aspect_ratio (Str): that distance over the longest; 1 for an isotropic surface, near 0 for a
           lay. NaN if the autocorrelation does not fall to 0.2 within half the surface in every direction.
         - core_height (Sk, m), reduced_peak_height (Spk, m), reduced_valley_depth (Svk, m),
@@ -118,13 +118,10 @@ def _correlation(heights: Array, spacing: Sequence[float], periodic: Sequence[bo
     acf, reach = _autocorrelation(values, observed, (False, *periodic)[-2:])
     rays = 360  # over the half circle; 1440 change lengths by 2e-5 and the aspect ratio by 6e-5
     angles = np.zeros(1) if heights.ndim == 1 else np.arange(rays) * np.pi / rays
-    lengths = np.array([_decay(acf, reach, steps, float(angle)) for angle in angles])
-    if np.isnan(lengths).all():
-        return [math.nan, math.nan]
-    shortest = float(np.nanmin(lengths))
-    if heights.ndim == 1 or np.isnan(lengths).any():
-        return [shortest, math.nan]
-    return [shortest, shortest / float(lengths.max())]
+    lengths, fallen = np.transpose([_decay(acf, reach, steps, float(angle)) for angle in angles])
+    # a ray along which it has not fallen may fall just beyond its end
+    shortest = float(lengths.min()) if fallen[np.argmin(lengths)] else math.nan
+    return [shortest, shortest / float(lengths.max()) if heights.ndim == 2 and fallen.all() else math.nan]
 
 
 def _autocorrelation(
@@ -140,8 +137,10 @@ def _autocorrelation(
     return mean / mean[reach[0], reach[1]], (reach[0], reach[1])
 
 
-def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle: float) -> float:
-    """Return the distance along a ray at which the autocorrelation falls to `DECAY`; NaN if it does not."""
+def _decay(
+    acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle: float
+) -> tuple[float, bool]:
+    """Return the distance along a ray at which the autocorrelation falls to `DECAY`, or the end and False."""
     from scipy.ndimage import map_coordinates
 
     unit = np.sin(angle) / steps[0], np.cos(angle) / steps[1]  # points per metre
@@ -152,12 +151,11 @@ def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle
     number = 2 + int(per_point * longest * max(map(abs, unit)))
     distance = np.linspace(0.0, longest, number)
     places = [lag + u * distance for lag, u in zip(reach, unit, strict=True)]
-    coarse = map_coordinates(
-        acf, places, order=1, mode="nearest"
-    )  # the last place is on the edge, to rounding
+    # rounding puts the end of a ray beyond the edge
+    coarse = map_coordinates(acf, places, order=1, mode="nearest")
     below = np.flatnonzero(coarse <= DECAY)
     if not below.size:
-        return math.nan
+        return longest, False
     # a cubic through the points near the crossing; the margin leaves 6e-6 of the length, one of 2 leaves 3e-5
     near = slice(max(int(below[0]) - 2 * per_point, 0), int(below[0]) + 2 * per_point)
     low = [max(int(place[near].min()) - 4, 0) for place in places]
@@ -169,10 +167,10 @@ def _decay(acf: Array, reach: tuple[int, int], steps: tuple[float, float], angle
     where = distance[near]
     crossed = np.flatnonzero(fine <= DECAY)
     if not crossed.size or crossed[0] == 0:
-        return float(where[0]) if crossed.size else float(distance[below[0]])
+        return float(where[0]) if crossed.size else float(distance[below[0]]), True
     k = int(crossed[0])
     share = (fine[k - 1] - DECAY) / (fine[k - 1] - fine[k])
-    return float(where[k - 1] + share * (where[k] - where[k - 1]))
+    return float(where[k - 1] + share * (where[k] - where[k - 1])), True
 
 
 def _core(heights: Array) -> list[float]:

@@ -117,5 +117,19 @@ def two_waves(ny, nx):
 def test_a_ray_that_ends_at_the_edge_has_not_fallen():
     """Rounding puts the end of a ray beyond the last lag, where the correlation is not zero."""
     strip = two_waves(40, 800)
+    ratios = [fc.surfaces.texture(surface_of(z)).texture_aspect_ratio for z in (strip, strip.T)]
     lengths = [fc.surfaces.texture(surface_of(z)).autocorrelation_length for z in (strip, strip.T)]
     np.testing.assert_allclose(*map(float, lengths), rtol=1e-9)
+    assert np.isnan(ratios).all()
+
+
+def test_no_length_is_the_shortest_where_a_shorter_ray_has_not_fallen():
+    """Across the strip the correlation falls at 31 points; half of the strip are 20, along it are 81."""
+    strip = two_waves(40, 800)
+    result = fc.surfaces.texture(surface_of(strip))
+    assert np.isnan(result.autocorrelation_length)
+    assert "every direction" in result.autocorrelation_length.attrs["reason"]
+    whole = fc.surfaces.texture(surface_of(two_waves(800, 800)))
+    assert float(whole.autocorrelation_length) == pytest.approx(
+        120e-6 * np.arccos(-0.6) / (2 * np.pi), rel=0.1
+    )
