@@ -240,6 +240,9 @@ def _pooled(
         factor *= surface.unit ** (1 if measure == ABSOLUTE else 2)  # slabs above are in metres
     mean, counts = mean_increments(slabs, columns, vectors, measure)
     nominal = _nominal_counts(vectors, surface.shape, periodic, reach)
+    if reach == 1:  # half a period ahead is half a period back: each pair is met twice along such an axis
+        share = 0.5 ** (np.array(periodic) & (2 * np.abs(vectors) == surface.shape)).sum(axis=1)
+        counts, nominal = share * counts, share * nominal
     distance = np.hypot(vectors[:, 0] * surface.spacing[0], vectors[:, 1] * surface.spacing[1])
     # along the axes every lag is kept apart
     width = width if measure == SQUARE else longest

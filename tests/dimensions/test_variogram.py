@@ -107,6 +107,27 @@ def test_periodic_lags_end_at_half_period(increments):
     assert 0.02 < float(curve.lag.max()) <= 0.03 * (1 + 1e-9)
 
 
+def test_pairs_half_a_period_apart_count_once():
+    """A lag of half a period along y is its own opposite, and (6, 3) is the opposite of (6, -3)."""
+    heights = np.random.default_rng(8).standard_normal((12, 17)).cumsum(0)
+    for surface in (surface_of(heights, 1e-3, (True, True)), surface_of(heights.T, 1e-3, (True, True))):
+        curve = fc.dimensions.variogram(surface)  # few lags are summed directly
+        values = surface.values if surface.sizes["y"] == 12 else surface.values.T
+        lags = [(y, x) for y in range(7) for x in range(-8, 9) if (y, x) > (0, 0) and np.hypot(y, x) <= 6.0]
+        squares = {}
+        for y, x in lags:
+            numbers = np.arange(values.size).reshape(values.shape)
+            ahead = np.roll(numbers, (-y, -x), (0, 1))
+            ring = np.hypot(y, x) if np.hypot(y, x) <= 4.5 else float(np.floor(np.hypot(y, x) + 0.5))
+            pairs = np.sort(np.stack([numbers.ravel(), ahead.ravel()], axis=1), axis=1)
+            squares.setdefault(round(ring, 9), []).append(pairs)
+        for lag, (_, pairs) in enumerate(sorted(squares.items())):
+            distinct = np.unique(np.concatenate(pairs), axis=0)
+            difference = values.ravel()[distinct[:, 1]] - values.ravel()[distinct[:, 0]]
+            assert int(curve.pair_count[lag]) == len(distinct)
+            assert float(curve.variogram[lag]) == pytest.approx(0.5 * np.mean(difference**2), rel=1e-9)
+
+
 def test_slender_surface_uses_all_pairs():
     heights = np.random.default_rng(5).standard_normal((6, 80)).cumsum(axis=1)
     curve = fc.dimensions.variogram(surface_of(heights), max_lag=0.06)
