@@ -68,6 +68,11 @@ def is_within(values: Any, low: Any, high: Any) -> Any:
     return (values >= low / ROUNDED) & (values <= high * ROUNDED)
 
 
+def nearest_whole(values: Any) -> Array:
+    """Return the nearest whole numbers, of halves the even ones; a rounding error decides no half."""
+    return np.asarray(np.rint(np.round(values, 9)), dtype=np.int64)
+
+
 def spread_indices(count: int, most: int) -> list[int]:
     """Return at most `most` of the indices 0 ... count - 1, evenly spread and including both ends."""
     return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(count, most))})

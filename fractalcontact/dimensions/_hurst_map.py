@@ -25,7 +25,7 @@ import xarray as xr
 from fractalcontact.base import fft
 from fractalcontact.base.grid import read_grid
 from fractalcontact.base.labelled import leading_coords
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, nearest_whole
 from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
@@ -138,10 +138,10 @@ def hurst_map(
     ({'y': 5, 'x': 7}, 0.7)
     """
     grid, wavelengths = read_grid(surface), read_scales(scales)
-    edges = [max(SMALLEST, round(window / spacing)) for spacing in grid.spacing]
+    edges = [max(SMALLEST, int(nearest_whole(window / spacing))) for spacing in grid.spacing]
     edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
     length = 0.5 * window if step is None else min(float(step), max(grid.extent))
-    steps = [max(1, round(length / spacing)) for spacing in grid.spacing]
+    steps = [max(1, int(nearest_whole(length / spacing))) for spacing in grid.spacing]
     rows, columns = (
         np.arange(0, n - edge + 1, jump) for n, edge, jump in zip(grid.shape, edges, steps, strict=True)
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, nearest_whole
 from fractalcontact.base.results import public_result
 from fractalcontact.dimensions._curve import EXACT_MEAN, Curve, curve_dataset, no_profile, surface_check
 from fractalcontact.dimensions._methods import METHODS
@@ -137,7 +137,7 @@ def higuchi_curve(surface: Surface, window: Scales = None) -> Curve:
     sums, counts = np.zeros(lags.size), np.zeros(lags.size, dtype=np.int64)
     for axis in axes:
         lines = np.moveaxis(surface.heights, axis, -1)
-        steps = np.maximum(np.rint(lags * coarse / surface.spacing[axis]).astype(int), 1)
+        steps = np.maximum(nearest_whole(lags * coarse / surface.spacing[axis]), 1)
         for k, step in enumerate(steps):
             if step >= lines.shape[-1]:
                 continue

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base import spectra
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, nearest_whole
 from fractalcontact.base.results import public_result
 from fractalcontact.dimensions._curve import (
     EXACT_MEAN,
@@ -247,7 +247,7 @@ def detrended_fluctuation_curve(surface: Surface, window: Scales = None) -> Curv
     for axis in axes:
         lines = np.ascontiguousarray(np.moveaxis(surface.heights, axis, -1))
         for k, edge in enumerate(edges):
-            size = max(3, round(edge * coarse / surface.spacing[axis]))
+            size = max(3, int(nearest_whole(edge * coarse / surface.spacing[axis])))
             total, number = window_sums(lines, 1, size, is_square=True)
             sums[k] += total
             counts[k] += number

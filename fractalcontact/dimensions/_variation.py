@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, nearest_whole
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, EXACT_MEAN, Curve, curve_dataset
@@ -109,7 +109,7 @@ def _edges_of(surface: Surface, sizes: Array) -> Array:
     edges = np.zeros((sizes.size, 2), dtype=int)
     for axis in range(2 - surface.axes, 2):
         most = surface.shape[axis] - 1
-        edges[:, axis] = np.clip(np.rint(sizes / surface.spacing[axis]), 1, most)
+        edges[:, axis] = np.clip(nearest_whole(sizes / surface.spacing[axis]), 1, most)
     return np.unique(edges, axis=0)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import ROUNDED, Array, nearest_whole
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 
@@ -32,13 +32,14 @@ def square_windows(
     """
     axes = [axis for axis in (0, 1) if surface.shape[axis] > 1]
     coarse = max(surface.spacing[axis] for axis in axes)
-    largest = share * min((surface.shape[axis] - 1) * surface.spacing[axis] for axis in axes) / coarse
-    numbers = [int(np.log2(largest / first) + 1e-9) + 1 if largest >= first else 0 for first in smallest]
+    shortest = min((surface.shape[axis] - 1) * surface.spacing[axis] for axis in axes)
+    largest = share * shortest / coarse * ROUNDED
+    numbers = [int(np.log2(largest / first)) + 1 if largest >= first else 0 for first in smallest]
     edges = [first * 2.0 ** np.arange(number) for first, number in zip(smallest, numbers, strict=True)]
     sizes = np.sort(np.concatenate(edges))
     points = np.zeros((sizes.size, 2), dtype=int)
     for axis in axes:
-        points[:, axis] = np.maximum(np.rint(sizes * coarse / surface.spacing[axis]), 1)
+        points[:, axis] = np.maximum(nearest_whole(sizes * coarse / surface.spacing[axis]), 1)
     lengths = edge_lengths(surface, points)
     inside = between(lengths, window)
     return points[inside], lengths[inside]

@@ -55,6 +55,21 @@ def test_powers_of_two_change_no_bit(rough, name):
     np.testing.assert_array_equal(first.local_slope.isnull(), second.local_slope.isnull())
 
 
+@pytest.mark.parametrize("ratio", [1.0, 1.5, 2.5])
+@pytest.mark.parametrize("name", CURVES)
+def test_no_unit_of_length_moves_a_window(name, ratio):
+    """Halves of points, and windows as long as a quarter of the surface, are decided alike in every unit."""
+    heights = np.random.default_rng(3).standard_normal((41, 25)).cumsum(axis=0).cumsum(axis=1)
+    first = None
+    for unit in (1.0, 1e-3, 1e-4, 1.1):
+        result = CURVES[name](fc.surfaces.from_array(unit * heights, (ratio * unit, unit)))
+        values = next(iter(result.data_vars.values())).values
+        first = values if first is None else first
+        assert values.shape == first.shape
+        if values.size:
+            np.testing.assert_allclose(values / values[0], first / first[0], rtol=1e-6)
+
+
 @pytest.mark.parametrize("name", CURVES)
 def test_stack_equals_single_results(name):
     stack = fc.surfaces.fbm((24, 20), 1e-3, hurst=0.5, rms_increment=1e-5, members=3, rng=8)

@@ -156,3 +156,15 @@ def test_coverage_of_exact_surfaces(hurst):
         for k in range(30)
     ]
     assert 0.92 < np.mean(held) < 0.985
+
+
+def test_no_unit_of_length_moves_a_window():
+    """A window of 20.5 points has 20 in every unit, and a step of 8.5 has 8."""
+    rough = fc.surfaces.fbm((97, 60), 1.0, hurst=0.6, rms_increment=1e-2, rng=1).values
+    shapes = {
+        fc.dimensions.hurst_map(
+            fc.surfaces.from_array(unit * rough, unit), 20.5 * unit, step=8.5 * unit
+        ).hurst.shape
+        for unit in (1.0, 1e-3, 7e-5, 0.07, 1.1)
+    }
+    assert len(shapes) == 1
