@@ -31,6 +31,7 @@ from fractalcontact.dimensions._records import (
     CONSTANT,
     SIGNIFICANT,
     Estimate,
+    joined,
     normal_interval,
     plane,
     undefined,
@@ -199,11 +200,11 @@ def fit(method: Method, surface: Surface, scales: Scales, noise: float | None) -
         scale_max=float(curve.length.max()),
         window=rule,
         reason=_CORRELATED,
-        note=NO_NOISE if noise else _UNIT if method.natural_scale else "",
+        note=joined(NO_NOISE if noise else "", _UNIT if method.natural_scale else ""),
     )
     if not method.covariance:
         return estimate
-    if noise or surface.finest_scale or not surface.is_complete:
+    if surface.finest_scale or not surface.is_complete:
         return replace(estimate, reason=NO_NOISE if noise else _INCOMPLETE)
     covariance = function(method.covariance)(surface, curve, float(np.clip(hurst, LOWEST, HIGHEST)))
     if isinstance(covariance, str):
@@ -216,6 +217,8 @@ def fit(method: Method, surface: Surface, scales: Scales, noise: float | None) -
     low, high = normal_interval(hurst, error)
     estimate = replace(estimate, hurst=hurst, standard_error=error, ci_low=low, ci_high=high, reason="")
     estimate = replace(estimate, misfit=_misfit(x, y - expected(middle), covariance))
+    if noise:
+        return estimate.without_interval(NO_NOISE)
     return (
         estimate if not estimate.misfit > SIGNIFICANT else estimate.without_interval(misfit_reason(estimate))
     )

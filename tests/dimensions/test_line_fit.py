@@ -56,6 +56,16 @@ def test_coverage_is_near_95_percent(method, hurst):
     assert 0.90 <= np.mean((low <= hurst) & (hurst <= high)) <= 0.985
 
 
+@pytest.mark.parametrize("method", ["spectrum", "roughness_length", "variogram", "cube_counts", "increments"])
+def test_noise_that_is_not_in_the_model_changes_no_exponent(method):
+    rough = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.6, rms_increment=1e-6, rng=1)
+    plain, noisy = (fc.dimensions.estimate(rough, method, noise=noise).squeeze() for noise in (None, 1e-7))
+    assert float(noisy.hurst) == float(plain.hurst)
+    assert np.isnan(noisy.ci_low)
+    assert "noise" in str(noisy.reason.values) + str(noisy.note.values)
+    assert str(plain.note.values) in str(noisy.note.values)
+
+
 def test_no_interval_where_the_curve_is_bent():
     rough, smooth = (
         fc.surfaces.fbm((256, 256), 1e-4, hurst=hurst, rms_increment=1e-6, rng=3) for hurst in (0.1, 0.95)
