@@ -56,7 +56,9 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
     first, second = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(first) > 0:
         return undefined(CONSTANT)
-    rule = "the shortest lags, which carry nearly all information on H" if asked is None else "asked for"
+    rule = "the shortest lags, which carry nearly all information on H" if scales is None else "asked for"
+    if asked is None and scales is not None:
+        rule = "the shortest lags that the points resolve"
     window: dict[str, Any] = {
         "scale_min": stride * min(surface.grid.spacing),
         "scale_max": stride * LAGS[lags - 1] * coarse,

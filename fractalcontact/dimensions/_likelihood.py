@@ -69,6 +69,8 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     known = known.over(first.scale * surface.unit, rounding_noise(surface) / first.scale)
     turned = _of_azimuths(surface, first, window, known) if first.is_oblique else None
     estimate = turned or _of_modes(surface, first, window, known)
+    if window is not None and scales is None and estimate.window:
+        estimate = replace(estimate, window="all wavelengths that the points resolve")
     return replace(estimate, note=joined(marks, estimate.note))
 
 

@@ -77,10 +77,13 @@ class Estimate:
     def gridded(self, finest: float) -> Estimate:
         """Widen the interval by what gridding may have done to the power of the window."""
         excess = self.gridding_error(finest)
+        if not np.isfinite(excess):  # nothing was fitted
+            return self
         text = (
             f"gridded from points that resolve waves from {quantity_text(finest, 'm')} on, eight point "
-            f"distances: H may be too high by {excess:.2g}, which the interval holds"
+            f"distances: H may be too high by {excess:.2g}"
         )
+        text += ", which the interval holds" if np.isfinite(self.ci_low) else ""
         return replace(self, ci_low=self.ci_low - excess, note=joined(self.note, text))
 
     def limited(self) -> Estimate:

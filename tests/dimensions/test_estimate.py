@@ -399,3 +399,19 @@ def test_known_noise_gives_a_narrower_interval_that_holds(hurst, noise):
     error = [np.sqrt(np.mean([(float(r.hurst) - hurst) ** 2 for r in results])) for results in (free, known)]
     assert error[1] < error[0]
     assert np.median([float(result.rms_increment) for result in known]) == pytest.approx(2e-6, rel=0.15)
+
+
+def test_words_on_a_gridded_surface_are_of_what_was_done():
+    """Nobody asked for the scales; a method without an interval holds no error; a plane was not fitted."""
+    x, y = np.random.default_rng(1).uniform(0.0, 12e-3, (2, 12000))
+    rough = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+    z = rough.interp(x=("point", x), y=("point", y), kwargs={"fill_value": None}).values
+    methods = ["likelihood", "increments", "variogram"]
+    result = estimate(fc.surfaces.from_points(np.stack([x, y, z], axis=1), plane="xy"), methods)
+    assert not (result.window_rule == "asked for").any()
+    holds = [note.endswith("which the interval holds") for note in result.note.values]
+    np.testing.assert_array_equal(holds, np.isfinite(result.ci_low))
+    flat = estimate(fc.surfaces.from_points(np.stack([x, y, 0.1 * x], axis=1), plane="xy"), methods)
+    assert not any("nan" in note for note in flat.note.values)
+    asked = estimate(fc.surfaces.from_points(np.stack([x, y, z], axis=1), plane="xy"), scales=(2e-3, 1e-2))
+    assert str(asked.window_rule.values[0]) == "asked for"
