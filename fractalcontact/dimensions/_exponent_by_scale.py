@@ -181,9 +181,13 @@ def _record(surface: Surface, octaves: _Octaves) -> _Record:
     owner, mode_owner = octaves.index(bins.lnq), octaves.index(np.log(fit.lattice.q[fit.keep]))
     modes = np.bincount(mode_owner, minlength=octaves.number)
     is_there = (modes >= _LEAST_MODES) & (np.bincount(owner, minlength=octaves.number) >= _LEAST_BINS)
-    logs = _log_power(bins, fit.form if fit.theta[SPREAD] == 0.0 else ALIASED)
-    fits = [_fitted(bins, logs, owner == k) if is_there[k] else _PowerLaw() for k in range(octaves.number)]
     whole = likelihood(surface, None, None).limited()
+    form, theta = fit.form, fit.theta
+    if whole.posterior is not None:  # of the fit that `window_hurst` is from
+        hypothesis, _, theta = whole.posterior.most_probable
+        form = hypothesis.form
+    logs = _log_power(bins, form if theta[SPREAD] == 0.0 else ALIASED)
+    fits = [_fitted(bins, logs, owner == k) if is_there[k] else _PowerLaw() for k in range(octaves.number)]
     lengths = octaves.middle * surface.spacing[1]
     in_window = (lengths >= whole.scale_min / 2.0**0.5) & (lengths <= whole.scale_max * 2.0**0.5)
     window = _PowerLaw(whole.hurst, whole.ci_low, whole.ci_high)

@@ -62,6 +62,17 @@ def test_crop_of_a_periodic_surface_is_measured_without_aliases():
     assert ((result.ci_low < 0.3) & (result.ci_high > 0.3))[:, :2].mean() > 0.7
 
 
+@pytest.mark.parametrize("rng", [0, 4])
+def test_octaves_have_the_aliases_of_the_window(rng):
+    """The first fit took a lay for a blur, which has aliases: 1.08 and 1.11 for .6 in the shortest octave."""
+    surface = fc.surfaces.spectral(
+        (96, 128), (2.5e-4, 1e-4), hurst=0.6, rms_height=1e-5, anisotropy_ratio=1.7, direction=30.0, rng=rng
+    )
+    result = fc.dimensions.scaling(surface)
+    assert float(result.window_hurst) == pytest.approx(0.6, abs=0.05)
+    assert float(result.hurst[0]) == pytest.approx(float(result.window_hurst), abs=0.05)
+
+
 def test_profile_is_not_changed_by_a_tilt():
     heights = brownian(0.5, 1e-6, 2, (600,))
     result = scaling(heights + 1e-6 * np.arange(600))
