@@ -66,7 +66,11 @@ def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float
     first = first_fit(surface, known.spread)
     if first is None:
         return undefined(NO_MODES)
-    known = known.over(first.scale * surface.unit, rounding_noise(surface) / first.scale)
+    increment = first.scale * surface.unit
+    if noise and noise > increment:  # the rms increment of white noise is 1.4 times its height
+        heights = f"heights with an rms increment of {quantity_text(increment, 'm')}"
+        return undefined(f"white noise of {quantity_text(noise, 'm')} is not in {heights}: see `noise`")
+    known = known.over(increment, rounding_noise(surface) / first.scale)
     turned = _of_azimuths(surface, first, window, known) if first.is_oblique else None
     estimate = turned or _of_modes(surface, first, window, known)
     if window is not None and scales is None and estimate.window:

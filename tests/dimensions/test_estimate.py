@@ -401,6 +401,18 @@ def test_known_noise_gives_a_narrower_interval_that_holds(hurst, noise):
     assert np.median([float(result.rms_increment) for result in known]) == pytest.approx(2e-6, rel=0.15)
 
 
+@pytest.mark.parametrize("factor", [1e-9, 1.0, 1e6])
+def test_noise_that_is_not_in_the_heights_is_refused(factor):
+    """Once H = .05 with an interval to .29, and an rms increment of eleven times that of the heights."""
+    rough = factor * fc.surfaces.fbm((64, 64), 1e-4, hurst=0.6, rms_increment=1e-6, rng=1)
+    refused = estimate_one(rough, noise=factor * 5e-6)
+    assert np.isnan(refused.hurst)
+    assert np.isnan(refused.rms_increment)
+    assert "noise" in str(refused.reason.values)
+    white = rough.copy(data=factor * 1e-6 * np.random.default_rng(1).standard_normal((64, 64)))
+    assert np.isfinite(estimate_one(white, noise=factor * 1e-6).hurst)
+
+
 def test_words_on_a_gridded_surface_are_of_what_was_done():
     """Nobody asked for the scales; a method without an interval holds no error; a plane was not fitted."""
     x, y = np.random.default_rng(1).uniform(0.0, 12e-3, (2, 12000))
