@@ -100,13 +100,14 @@ def estimate(
         "psd" ("spectrum").
     scales : (low, high), optional
         Lengths in m between which to fit: wavelengths, lags, or edges of windows or cubes. Default: the
-        window of the method.
+        window of the method. "likelihood" takes the waves between as they are, without noise or blur, unless
+        these are given.
     noise : float, optional
         Rms height in m of the white measurement noise, 0 for none ("likelihood" only). By default it is
         estimated where the heights show it.
     psf : float, optional
         Standard deviation in m of the Gaussian point spread function of the instrument, 0 for none
-        ("likelihood" with free edges only). By default it is estimated where the heights show a blur.
+        ("likelihood" only). By default it is estimated where the heights show a blur.
 
     Returns
     -------
