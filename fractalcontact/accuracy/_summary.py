@@ -116,8 +116,10 @@ def _estimators_summary(bench: xr.Dataset) -> str:
                 cells = [_estimator_cell(*values) for values in zip(*columns, strict=True)]
                 # the run time of the median exponent
                 rows.append((str(method), *cells, f"{float(row['run_time'].median()):.1e}"))
-            head = f"{family}, {size} x {size} points, {members} surfaces\nCramer-Rao bounds {bounds}"
-            blocks.append(f"{head}\n{table(rows)}")
+            is_profile = family == "profile"
+            points = f"{size} points" if is_profile else f"{size} x {size} points"
+            head = f"{family}, {points}, {members} {'profiles' if is_profile else 'surfaces'}"
+            blocks.append(f"{head}\nCramer-Rao bounds {bounds}\n{table(rows)}")
     return "\n\n".join(blocks)
 
 

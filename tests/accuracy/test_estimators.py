@@ -91,6 +91,13 @@ def test_summary_and_command(capsys, tmp_path, small):
     assert fc.open(tmp_path / "estimators.nc")["error_ratio"].shape == (1, 1, 1, 1)
 
 
+def test_summary_of_profiles():
+    bench = fc.accuracy.estimators(0.5, 32, ["fbm", "profile"], "increments", members=3, rng=1)
+    text = fc.accuracy.summary(bench)
+    assert "profile, 32 points, 3 profiles" in text
+    assert "fbm, 32 x 32 points, 3 surfaces" in text
+
+
 def test_wrong_arguments_are_all_named():
     with pytest.raises(InvalidInput) as caught:
         fc.accuracy.estimators(hurst=1.5, sizes=8, families="cantor", methods="magic", members=[1, 2])
