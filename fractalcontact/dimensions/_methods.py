@@ -35,7 +35,8 @@ class Window:
         """The window in words."""
         ends = [f"1/{1 / self.share:g} of the extent"] if self.share else []
         ends += [f"{self.least:g} spacings"] if self.least else []
-        first = f"{self.shortest:g} spacings to " if self.shortest else "up to "
+        unit = "spacing" if self.shortest == 1 else "spacings"
+        first = f"{self.shortest:g} {unit} to " if self.shortest else "up to "
         return first + (f"the larger of {' and '.join(ends)}" if len(ends) > 1 else ends[0])
 
 
