@@ -33,7 +33,7 @@ from fractalcontact.dimensions._records import (
     plane,
     undefined,
 )
-from fractalcontact.dimensions._surface_input import Scales, Surface
+from fractalcontact.dimensions._surface_input import Scales, Surface, between
 
 # first differences where the pilot estimate is below, second differences above: their standard errors are
 # equal at H = 0.53 on 256 x 256 points and 0.43 on 1024 x 1024
@@ -42,16 +42,16 @@ _FIRST_BELOW = 0.45
 
 def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimate:
     """Estimate H of one surface by the closed form, with its interval."""
-    coarse = max(surface.grid.spacing)
-    stride, lags = 1, len(LAGS)
-    asked, scales = scales, surface.resolved(scales)
+    stride, asked, scales = 1, scales, surface.resolved(scales)
     if scales is not None:
-        stride = max(1, int(np.ceil(scales[0] / coarse * (1 - 1e-9))))
-        lags = sum(lag * stride * coarse <= scales[1] * (1 + 1e-9) for lag in LAGS)
-        if lags < 2:
-            return undefined(
-                f"two lags m and 2 m spacings are needed between {scales[0]:g} m and {scales[1]:g} m"
-            )
+        stride = max(1, int(np.ceil(scales[0] / max(surface.grid.spacing) * (1 - 1e-9))))
+    lags = stride * np.multiply.outer(surface.grid.spacing, LAGS)
+    is_inside = between(lags, scales)
+    is_inside &= np.count_nonzero(is_inside, axis=1, keepdims=True) > 1
+    if scales is not None and not is_inside.any():
+        return undefined(
+            f"two lags m and 2 m spacings are needed between {scales[0]:g} m and {scales[1]:g} m"
+        )
     moments = increment_moments(surface.slabs(REACH * stride), surface.grid.shape, stride)
     first, second = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(first) > 0:
@@ -60,19 +60,19 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
     if asked is None and scales is not None:
         rule = "the shortest lags that the points resolve"
     window: dict[str, Any] = {
-        "scale_min": stride * min(surface.grid.spacing),
-        "scale_max": stride * LAGS[lags - 1] * coarse,
+        "scale_min": float(lags[is_inside].min()),
+        "scale_max": float(lags[is_inside].max()),
         "window": rule,
     }
     rounding = 0.0 if surface.is_lazy else 4.0 * np.spacing(abs(float(surface.raw[0, 0])))
     if not np.nansum(second) > max(1e-22 * np.nansum(first), rounding**2):
         return replace(plane(), **window)
-    pilot = _line(replace(moments, observed=None), surface.relative_spacing, 2, 0.5, lags)
+    pilot = _line(replace(moments, observed=None), surface.relative_spacing, 2, 0.5, is_inside)
     if not np.isfinite(pilot.hurst):
         step = stride * surface.spacing[1]
         return undefined(f"increments over at least two of the lags 1, 2 and 4 times {step:g} m are needed")
     order = 1 if pilot.hurst < _FIRST_BELOW else 2
-    estimate = replace(_line(moments, surface.relative_spacing, order, pilot.hurst, lags), **window)
+    estimate = replace(_line(moments, surface.relative_spacing, order, pilot.hurst, is_inside), **window)
     # second differences over one lag have 4 - 4^H times the mean square of first differences
     square = first[0] if order == 1 else second[0] / (4.0 - 4.0 ** min(estimate.hurst, 0.999))
     rms = float(np.sqrt(square) * float(stride) ** -estimate.hurst)
@@ -94,14 +94,19 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
     return estimate
 
 
-def _line(moments: Moments, spacing: tuple[float, ...], order: int, pilot: float, lags: int) -> Estimate:
-    """Fit the line through differences of an order with the weights of a surface of exponent `pilot`."""
+def _line(
+    moments: Moments, spacing: tuple[float, ...], order: int, pilot: float, is_inside: Array
+) -> Estimate:
+    """Fit the line through differences of an order with the weights of a surface of exponent `pilot`.
+
+    `is_inside`: lags that count, shape (axes, 3).
+    """
     axes = len(spacing)
     along = [6, 0][2 - axes :]  # y, then x, of the columns of the moments
     means = np.concatenate([moments.means[start + 3 * (order - 1) :][:3] for start in along])
     # logarithms of numbers near one: the unit of height changes no bit
     means = means / power_of_two(float(np.nanmax(means, initial=0.0)))
-    usable = np.isfinite(means) & (means > 0) & (np.arange(3 * axes) % 3 < lags)
+    usable = np.isfinite(means) & (means > 0) & is_inside.ravel()
     by_axis = usable.reshape(axes, 3)
     by_axis &= np.count_nonzero(by_axis, axis=1, keepdims=True) > 1
     if not usable.any():

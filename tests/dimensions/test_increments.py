@@ -178,3 +178,17 @@ def test_constant_heights_give_no_exponent():
     result = estimate(np.ones((9, 9)))
     assert np.isnan(result.hurst)
     assert "constant" in result.reason.item()
+
+
+@pytest.mark.parametrize("spacing", [(1e-4, 2e-4), (4e-4, 1e-4)])
+@pytest.mark.parametrize("scales", [(1e-4, 3e-4), (3e-4, 1e-3), (8e-4, 4e-3)])
+def test_no_lag_lies_outside_the_scales(spacing, scales):
+    """Once increments over half of the shortest lag counted along the axis of the smaller spacing."""
+    rough = fc.surfaces.fbm((160, 120), spacing, hurst=0.6, rms_increment=1e-6, rng=1)
+    result = fc.dimensions.estimate(rough, "increments", scales=scales).squeeze()
+    assert scales[0] * (1 - 1e-9) <= float(result.scale_min) < float(result.scale_max)
+    assert float(result.scale_max) <= scales[1] * (1 + 1e-9)
+    assert float(result.ci_low) < 0.6 < float(result.ci_high)
+    swapped = rough.rename(x="y", y="x").transpose("y", "x")
+    mirrored = fc.dimensions.estimate(swapped, "increments", scales=scales).squeeze()
+    assert float(mirrored.hurst) == pytest.approx(float(result.hurst), rel=1e-9)
