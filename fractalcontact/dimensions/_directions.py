@@ -118,7 +118,8 @@ def directions(
     -----
     The model is that of `estimate`: all directions have the same blur, noise and bend, which widen their
     intervals. An exponent is that of the waves that run along a direction, weighted by the sixteenth power
-    of the cosine of their angle to it. Single waves are taken out first.
+    of the cosine of their angle to it. Single waves are taken out first. Intervals of a gridded surface hold
+    what gridding may add to the exponent, as in `estimate`.
     Models and tests: page `theory_dimensions`; measured size, power, coverage: page `estimator_accuracy`.
 
     References
@@ -269,14 +270,17 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
         _along(fit, a, along, every, first.scale * surface.unit, reason)
         for a, along in zip(azimuths, each, strict=True)
     ]
-    records = [replace(record, note=joined(note, record.note)).limited() for record in records]
+    shortest = np.nan if scales is None else scales[0]
+    records = [replace(record, note=joined(note, record.note), scale_min=shortest) for record in records]
+    records = [record.gridded(surface.finest_scale).limited() for record in records]
     return _Directional(records, anisotropy, anisotropy.reason)
 
 
 def _of_ridges(surface: Surface, dim: str, ridge: float, azimuths: Array, scales: Scales) -> _Directional:
     """Measure a surface that varies across its ridges alone, as a profile."""
     profile = surface.source.isel({dim: 0}, drop=True)
-    across = likelihood(read_surfaces(profile.rename(y="x") if dim == "x" else profile)[0], scales, None)
+    line = read_surfaces(profile.rename(y="x") if dim == "x" else profile)[0]
+    across = likelihood(line, scales, None).gridded(surface.finest_scale)
     records = []
     for azimuth in azimuths:
         share = abs(np.sin(np.radians(azimuth - ridge)))

@@ -166,9 +166,7 @@ def estimate(
                 record = increments(single, window, noise)
             else:
                 record = fit(METHODS[_row(name)], single, window, noise)
-            if single.finest_scale:
-                record = record.gridded(single.finest_scale)
-            estimates.append(record.limited())
+            estimates.append(record.gridded(single.finest_scale).limited())
             times[row, column] = time.perf_counter() - start
     return _dataset(surface, surfaces, names, estimates, times)
 

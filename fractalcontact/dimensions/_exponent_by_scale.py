@@ -181,7 +181,7 @@ def _record(surface: Surface, octaves: _Octaves) -> _Record:
     owner, mode_owner = octaves.index(bins.lnq), octaves.index(np.log(fit.lattice.q[fit.keep]))
     modes = np.bincount(mode_owner, minlength=octaves.number)
     is_there = (modes >= _LEAST_MODES) & (np.bincount(owner, minlength=octaves.number) >= _LEAST_BINS)
-    whole = likelihood(surface, None, None).limited()
+    whole = likelihood(surface, None, None).gridded(surface.finest_scale).limited()
     form, theta = fit.form, fit.theta
     if whole.posterior is not None:  # of the fit that `window_hurst` is from
         hypothesis, _, theta = whole.posterior.most_probable

@@ -127,7 +127,8 @@ def hurst_map(
     Windows that overlap have correlated errors: compare those at least one window apart. Blur, noise and bend
     of the spectrum are those of the model of `estimate`, the same in all windows; single waves are taken out
     first, but of dask arrays. The interval of a window whose spectrum differs from the others by more than
-    its exponent is wider. Theory: page `theory_dimensions`.
+    its exponent is wider; that of a gridded surface holds what gridding may add, as in `estimate`. Theory:
+    page `theory_dimensions`.
 
     Examples
     --------
@@ -213,7 +214,7 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     rows = [_spectra(model, surface, int(row), windows) for row in windows.rows]
     records = [record for row in rows for record in row[0]]
     chosen = np.flatnonzero([record is None for record in records])
-    if model is None or chosen.size == 0:
+    if middle is None or model is None or chosen.size == 0:
         others = undefined(NO_MODES) if first is None or not first.modes or scales is not None else smooth()
         return [record or (plane() if is_plane else others) for record in records]
     mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
@@ -222,7 +223,8 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     shares, centres, deviations = model.components(*levels, windows.new_share)
     for place, centre, deviation in zip(chosen, centres, deviations, strict=True):
         low, hurst, high, error = mixture_interval(shares, centre, deviation)
-        records[place] = Estimate(hurst, error, low, high)
+        record = Estimate(hurst, error, low, high, scale_min=np.nan if scales is None else scales[0])
+        records[place] = record.gridded(middle.finest_scale).limited()
     return [record or undefined(NO_MODES) for record in records]
 
 

@@ -75,9 +75,9 @@ class Estimate:
         return GRIDDING * (finest / self.scale_min) ** 2 if self.scale_min > 0 else np.nan
 
     def gridded(self, finest: float) -> Estimate:
-        """Widen the interval by what gridding may have done to the power of the window."""
+        """Widen the interval by what gridding may have done to the power of the window; not without one."""
         excess = self.gridding_error(finest)
-        if not np.isfinite(excess):  # nothing was fitted
+        if not excess > 0.0:  # all points were measured, or nothing was fitted
             return self
         text = (
             f"gridded from points that resolve waves from {quantity_text(finest, 'm')} on, eight point "

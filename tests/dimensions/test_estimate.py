@@ -427,3 +427,25 @@ def test_words_on_a_gridded_surface_are_of_what_was_done():
     assert not any("nan" in note for note in flat.note.values)
     asked = estimate(fc.surfaces.from_points(np.stack([x, y, z], axis=1), plane="xy"), scales=(2e-3, 1e-2))
     assert str(asked.window_rule.values[0]) == "asked for"
+
+
+def test_every_interval_of_a_gridded_surface_holds_what_gridding_adds():
+    """Once those of directions, windows and octaves were as long as if all points were measured."""
+    x, y = np.random.default_rng(1).uniform(0, 16e-3, (2, 25000))
+    rough = fc.surfaces.fbm((170, 170), 1e-4, hurst=0.7, rms_increment=1e-5, rng=1)
+    z = rough.interp(x=("point", x), y=("point", y), kwargs={"fill_value": None}).values
+    gridded = fc.surfaces.from_points(np.stack([x, y, z], axis=1), plane="xy")
+    finest = float(gridded.finest_scale)
+    scales = (finest, 4.0 * max(n * 1e-4 for n in gridded.shape))
+    measured = gridded.drop_vars("finest_scale")
+    dimensions = fc.dimensions
+    for result, same in (
+        (dimensions.directions(gridded), dimensions.directions(measured, scales=scales)),
+        (dimensions.hurst_map(gridded, 1.2e-2), dimensions.hurst_map(measured, 1.2e-2, scales=scales)),
+    ):
+        np.testing.assert_allclose(result.hurst, same.hurst, atol=1e-6)
+        np.testing.assert_allclose(result.ci_high, same.ci_high, atol=1e-6)
+        np.testing.assert_allclose(result.ci_low, np.maximum(same.ci_low - 0.035, 0.0), atol=1e-6)
+    whole, octaves = estimate_one(gridded), dimensions.scaling(gridded)
+    assert float(octaves.window_ci_low) == float(whole.ci_low)
+    assert float(octaves.window_ci_high) == float(whole.ci_high)
