@@ -24,7 +24,7 @@ from fractalcontact.dimensions._azimuths import (
     fit_azimuths,
 )
 from fractalcontact.dimensions._diagnosis import diagnose, rounding_noise
-from fractalcontact.dimensions._likelihood import NO_MODES, likelihood
+from fractalcontact.dimensions._likelihood import likelihood, too_few_modes
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, squared_length
 from fractalcontact.dimensions._mode_fit import first_fit
 from fractalcontact.dimensions._records import CONSTANT, NORMAL, Estimate, joined, plane, smooth, undefined
@@ -257,7 +257,8 @@ def _of_surface(surface: Surface, azimuths: Array, scales: Scales) -> _Direction
     fit = None if first is None else fit_azimuths(first, lengths, known.over(1.0, background))
     if first is None or fit is None:
         too_smooth = smooth() if surface.is_complete else undefined(_FILLED)
-        record = (too_smooth if scales is None else undefined(NO_MODES)).limited()
+        few = undefined(too_few_modes(None if first is None else scales))
+        record = (too_smooth if scales is None else few).limited()
         return _Directional([record] * azimuths.size, None, record.note)
     anisotropy = _Anisotropy.of(fit)
     reason = diagnose(surface)

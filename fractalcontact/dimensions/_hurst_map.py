@@ -31,7 +31,7 @@ from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._diagnosis import resampling, rounding_noise
 from fractalcontact.dimensions._gaussian_mixture import Bins, Lattice
-from fractalcontact.dimensions._likelihood import NO_MODES
+from fractalcontact.dimensions._likelihood import NO_MODES, too_few_modes
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
@@ -179,6 +179,9 @@ def hurst_map(
     result = xr.Dataset(data, coords=coords)
     for name in _FIELDS[1:] if reasons else ():
         result[name].attrs["reason"] = reasons
+    missing = "; ".join(dict.fromkeys(record.reason for record in records if np.isnan(record.hurst)))
+    for name in ("hurst", "fractal_dimension") if missing else ():
+        result[name].attrs["reason"] = missing
     if notes:
         result["hurst"].attrs["comment"] = "; ".join(dict.fromkeys(notes))
     return result
@@ -215,7 +218,9 @@ def _estimates(surface: xr.DataArray, windows: _Windows, scales: Scales) -> list
     records = [record for row in rows for record in row[0]]
     chosen = np.flatnonzero([record is None for record in records])
     if middle is None or model is None or chosen.size == 0:
-        others = undefined(NO_MODES) if first is None or not first.modes or scales is not None else smooth()
+        has_modes = first is not None and bool(first.modes)
+        few = undefined(too_few_modes(scales if has_modes else None))
+        others = smooth() if has_modes and scales is None else few
         return [record or (plane() if is_plane else others) for record in records]
     mean, share = (np.concatenate([row[k] for row in rows])[chosen] for k in (1, 2))
     degrees = 0.5 * model.lattice.degrees * model.count * share

@@ -48,6 +48,11 @@ NO_MODES = (
 )
 
 
+def too_few_modes(scales: Scales) -> str:
+    """Return why there is no exponent where too few modes are left, in a window of lengths in m if given."""
+    return NO_MODES if scales is None else f"too few modes between {scales[0]:g} m and {scales[1]:g} m"
+
+
 def likelihood(surface: Surface, scales: Scales, noise: float | None, psf: float | None = None) -> Estimate:
     """Estimate the exponent of one surface.
 

@@ -168,3 +168,19 @@ def test_no_unit_of_length_moves_a_window():
         for unit in (1.0, 1e-3, 7e-5, 0.07, 1.1)
     }
     assert len(shapes) == 1
+
+
+@pytest.mark.parametrize("scales", [(4e-3, 1e-2), (1e-4, 1.5e-4)])
+def test_scales_without_modes_are_named(scales):
+    """Once "give more points", and of the exponent that heights do not vary."""
+    rough = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.6, rms_increment=1e-6, rng=1)
+    windows = fc.dimensions.hurst_map(rough, 3.2e-3, scales=scales)
+    directions = fc.dimensions.directions(rough, scales=scales)
+    named = f"too few modes between {scales[0]:g} m and {scales[1]:g} m"
+    for result, names in (
+        (windows, ("hurst", "ci_low", "fractal_dimension")),
+        (directions, ("hurst", "ci_low")),
+    ):
+        for name in names:
+            assert np.isnan(result[name]).all()
+            assert result[name].attrs["reason"] == named
