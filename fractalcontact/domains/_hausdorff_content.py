@@ -76,12 +76,12 @@ def hausdorff_content(
     mask : DataArray, dims (..., y, x)
         Boolean, or integer flags where contact means value > 0; of square cells.
     s : number or sequence, 0 to 2
-        Exponents. At 2 the content is the area; at 1 it bounds the contact stiffness; near the dimension of
-        the domain, 1.4 to 1.6 for Hurst exponents of .5 to .8, it does not depend on the resolution (see
-        `area_dimension`).
+        Exponents. At 2 the content is the area; at 1, times 1.1523 E*, it bounds the contact stiffness; near
+        the dimension of the domain, 1.4 to 1.6 for Hurst exponents of .5 to .8, it does not depend on the
+        resolution (see `area_dimension`).
     coarsest : float, optional
         Side of the largest square in metres, rounded down to a power of two of the spacing; by default the
-        largest that begins inside the extent.
+        smallest that covers the mask.
     shifts : int
         Positions of the grid of squares over which the content is averaged: the first begins at the first
         cell, the others are spread evenly over the largest square.
