@@ -6,7 +6,7 @@ pool              common exponent of several scans, and their scatter
 directions        exponent by direction, and tests of isotropy
 hurst_map         exponent in windows that move over the surface
 waves             single waves, such as marks of machining
-scaling           exponent by octave of wavelength, and the window that has one exponent
+scaling           exponent by octave of wavelength, beside that of `estimate`
 spectrum          power spectral density, averaged over directions
 variogram         half the mean square increment against the lag; madogram, second differences
 roughness_length  rms height in windows against their edge

@@ -255,8 +255,8 @@ WINDOW = ("window_hurst", "window_ci_low", "window_ci_high", "scale_min", "scale
 def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the Hurst exponent of every octave of wavelength with its interval.
 
-    The band is the longest run of octaves with one exponent, as wide as its wavelengths and as high as the
-    interval of its exponent. The range of fractals, 0 to 1, lies between the dotted lines.
+    The band is the exponent of `dimensions.estimate`, as wide as the waves that its model describes and as
+    high as its interval. The range of fractals, 0 to 1, lies between the dotted lines.
 
     Parameters
     ----------

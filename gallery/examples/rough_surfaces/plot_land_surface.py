@@ -23,8 +23,8 @@ print(f"{land.sizes['y']} x {land.sizes['x']} heights, {spacing[0]:.0f} m x {spa
 print(land)
 
 # %%
-# No single exponent describes all wavelengths here, nor does one with the blur of an instrument; the default
-# estimate is that of the longest run of octaves that one exponent explains. The note says so.
+# No single exponent describes all wavelengths here; the default estimate takes the map for blurred, and gives
+# the long waves an exponent of their own. The note says so.
 
 result = fc.dimensions.estimate(land).sel({"method": "default"})
 low, high = float(result.ci_low), float(result.ci_high)
@@ -33,13 +33,13 @@ print(result.note.item())
 
 # %%
 # The exponent by octave of wavelength shows why: it falls from above 1 at the shortest waves, where the map
-# is smooth, to about 0 beyond the width of ridges and valleys. The blue window is that of the estimate. The
-# published values are means over larger pieces of land: the lower one is just inside the upper end of the
-# interval, the higher one is outside.
+# is smooth, to about 0 beyond the width of ridges and valleys. The blue window is that of the estimate, whose
+# exponent is that of the short waves. The published values are means over larger pieces of land; they lie
+# between the exponents of the short and of the long waves here.
 
 by_octave = fc.dimensions.scaling(land)
 longest = (float(by_octave.scale_min), float(by_octave.scale_max))
-print(f"one exponent from {1e-3 * longest[0]:.1f} to {1e-3 * longest[1]:.0f} km:", end=" ")
+print(f"estimate over {1e-3 * longest[0]:.1f} to {1e-3 * longest[1]:.0f} km:", end=" ")
 print(f"H = {float(by_octave.window_hurst):.2f}", end=", ")
 print(f"95 % interval {float(by_octave.window_ci_low):.2f} to {float(by_octave.window_ci_high):.2f}")
 figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")

@@ -41,7 +41,7 @@ print(f"dimension {float(result.fractal_dimension):.2f}")
 print(result.note.item() or "no remark")
 
 # %%
-# Left, the exponent by octave of wavelength; blue is the longest run of octaves that one exponent explains.
+# Left, the exponent by octave of wavelength; blue is the estimate, over the waves that its model describes.
 # Right, the exponent by direction; the grey bands are the published ones, of other rocks.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(8.5, 3.4), layout="constrained")
