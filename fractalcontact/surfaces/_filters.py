@@ -102,7 +102,7 @@ def gaussian_filter(surface: xr.DataArray, cutoff: float, *, waves: str = "long"
     surface : DataArray
         Heights in metres, dims (..., y, x) or (..., x). Missing points (NaN) have no weight and stay missing.
     cutoff : float
-        Wavelength in m at which half the amplitude passes (nesting index); at least four spacings.
+        Wavelength in m at which half the amplitude passes (nesting index); four spacings to the extent.
     waves : {"long", "short"}
         "long" returns the weighted mean, as an S-filter of ISO 25178-3 that removes short waves, or the
         waviness; "short" returns the heights less that mean, as an L-filter, or the roughness.
@@ -115,7 +115,7 @@ def gaussian_filter(surface: xr.DataArray, cutoff: float, *, waves: str = "long"
     Raises
     ------
     InvalidInput
-        Not a surface in metres on a uniform grid, or a cutoff outside its lengths.
+        Not a surface in metres on a uniform grid, or a cutoff outside these lengths.
 
     Notes
     -----

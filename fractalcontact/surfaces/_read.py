@@ -87,11 +87,12 @@ def read(
         or arrays `x` and `y`; points, in `.npy` an array of two or three columns too, are gridded by
         `from_points`.
     channel : str or int, optional
-        Channel of an instrument's file, variable of a NetCDF file, or band of a raster (from 0). Default:
-        the first height channel.
+        Channel of an instrument's file or band of a raster (by its number, from 0), variable of a NetCDF
+        file, or array of an `.npz` file. Default: the first height channel, `height`, or the only one.
     units : str, optional
         Unit of the heights, and of all coordinates of points: "m", "mm", "um", "nm" ... Default: that of the
-        file, or metres where it states none. A unit other than that of the file replaces it, with a warning.
+        file; metres for tables, points, rasters and arrays without one. A unit other than that of the file
+        replaces it, with a warning.
     spacing : float, or (y, x), optional
         Distance between points in metres; replaces that of the file. Of points: that of the cells.
     first_row : {"bottom", "top"}, optional
@@ -110,7 +111,8 @@ def read(
     Raises
     ------
     UnreadableFile
-        The file is corrupt, of an unknown format, states no unit or size, or is not a uniform grid.
+        The file is corrupt, of an unknown format or no uniform grid, or a spacing is missing, or the unit of
+        a NetCDF or instrument's file.
     MissingExtra
         The library that reads the format is not installed.
 
