@@ -85,9 +85,10 @@ def area_by_resolution(
     Returns
     -------
     Dataset over (shear, step)
-        area_dimension with ci_low and ci_high, see `fractalcontact.domains.area_dimension`. Over (shear,
-        step, resolution) contact_fraction, corrected_contact_fraction, local_slope, interface_closure (m),
-        residual and converged; the resolution is the spacing (m). nominal_area (m2), run_time (s).
+        area_dimension with ci_low and ci_high, and stationary_exponent, see
+        `fractalcontact.domains.area_dimension`. Over (shear, step, resolution) contact_fraction,
+        corrected_contact_fraction, local_slope, interface_closure (m), residual and converged; the resolution
+        is the spacing (m). nominal_area (m2), run_time (s).
 
     Raises
     ------

@@ -92,8 +92,8 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
         initial_stiffness Kni (Pa/m) and greatest_closure Vm (m, infinite for a straight line) of the
         hyperbola, with 95 % intervals (_low, _high); exponential_misfit and hyperbolic_misfit (m, rms);
         preferred_law (flags undecided, exponential, hyperbolic, neither) and law_score, positive for the
-        exponential. Over (..., step): stiffness dp/dw (Pa/m); with a seating pressure seated_closure (m).
-        NaN with the `reason` where nothing can be fitted.
+        exponential. Over (..., step): stiffness dp/dw (Pa/m); with a seating pressure seated_closure (m), and
+        seating_pressure (Pa). NaN with the `reason` where nothing can be fitted.
 
     Raises
     ------

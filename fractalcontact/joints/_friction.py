@@ -115,9 +115,10 @@ def friction(
         dilatancy_angle, friction_angle (degree) over (direction, shear[, step]), with "energy" also
         frictionless_angle, atan(T/N); with forces or pressures shear_strength (Pa), negative where the block
         slides by itself. Over (direction[, step]): peak_friction_angle, peak_shear_strength, and the shears v
-        of both; peak_distance (m). secant_friction_angle and secant_shear_strength over `distance`: the peaks
-        over this distance halved and doubled, as far as the shears resolve. Strengths and peaks are NaN with
-        the `reason` where the faces lock. Also basic_friction_angle and, over shear, smoothing.
+        of both, peak_shear and peak_strength_shear (m); peak_distance (m). secant_friction_angle and
+        secant_shear_strength over `distance`: the peaks over this distance halved and doubled, as far as the
+        shears resolve. Strengths and peaks are NaN with the `reason` where the faces lock. Also
+        basic_friction_angle and, over shear, smoothing.
 
     Raises
     ------

@@ -116,9 +116,10 @@ def partial_slip(
         tangential_displacement (m), tangential_stiffness (N/m), stick_area, slip_area, dissipated_energy and
         the solver columns of `contact.partial_slip`; shear_stiffness K_s and stiffness_ratio K_s/K_n. Over
         shear: interface_stiffness K_n (Pa/m, at the normal load), sliding_force (N), at which all slides,
-        contact_area, closure; stuck_ratio 2 (1 - nu)/(2 - nu), the theory for K_s/K_n before any slip. The
-        part of the flat block is subtracted from both stiffnesses, as from the interface closure; they are
-        NaN where nothing is left, for mated faces.
+        contact_area, closure, slip_method (flags: the method that was chosen), superposition_error;
+        stuck_ratio 2 (1 - nu)/(2 - nu), the theory for K_s/K_n before any slip. The part of the flat block is
+        subtracted from both stiffnesses, as from the interface closure; they are NaN where nothing is left,
+        for mated faces.
 
     Raises
     ------

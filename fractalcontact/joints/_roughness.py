@@ -99,8 +99,9 @@ def roughness_coefficient(
     Dataset over direction
         roughness_coefficient, the JRC of `strength_envelope`; a value outside 0 to 20 is an
         extrapolation, which scale_position reports. roughness_coefficient_low and _high, between which 95 %
-        of the single profiles of the surface lie. profile_slope Z2; lag (m) and lag_azimuth (degree) in
-        use, of whole cells; regression_interval (m). With `length` scaled_roughness_coefficient.
+        of the single profiles of the surface lie, NaN of fewer than 20. profile_slope Z2; lag (m) and
+        lag_azimuth (degree) in use, of whole cells; regression_interval (m). With `length`
+        scaled_roughness_coefficient.
 
     Raises
     ------

@@ -129,7 +129,7 @@ def strength_envelope(
     ------
     InvalidInput
         An argument is wrong or missing for a criterion, or the asperity angle that a criterion needs and the
-        basic friction angle add up to 90 degrees.
+        basic friction angle add up to 90 degrees or more.
 
     Notes
     -----

@@ -155,7 +155,7 @@ def uplift(
         The two sides: an edge (E is +x), or the line of cells at this x or y (m), beyond which the pressure
         is the same. Default: W, and the edge opposite; of a line E or N.
     drains, drain_pressure, drain_diameter : sequence of (x, y), float, float, optional
-        Drains, m. The open cells within `drain_diameter` (m), or the nearest cell, are held at
+        Drains, m. The open cells in a circle of `drain_diameter` (m), or the nearest cell, are held at
         `drain_pressure` (Pa, default `downstream_pressure`). One cell is a drain with a radius of 0.14
         hypot(dx, dy), 0.2 spacings of square cells (Peaceman 1983). A drain in contact has no effect.
     drain_share : float
@@ -163,9 +163,9 @@ def uplift(
     normal_stiffness : float, optional
         Pa/m. The pressure opens each open cell by pressure / stiffness, iterated to balance with the flow.
     total_stress : float, optional
-        Normal stress of structure and joint together, Pa. `gap` is then a path over `step` with the
-        coordinate nominal_pressure, as `closure` returns it: on it the effective stress is found that, with
-        the mean uplift, balances the total one.
+        Normal stress of structure and joint together, Pa; not with `normal_stiffness`. `gap` is then a path
+        over `step` with the coordinate nominal_pressure, as `closure` returns it: on it the effective stress
+        is found that, with the mean uplift, balances the total one.
 
     Returns
     -------
