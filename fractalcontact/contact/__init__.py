@@ -4,8 +4,9 @@
 
 `press` presses a rigid flat down on a surface and returns a Dataset over the steps of a load path; both
 elastic bodies are in the contact modulus E*, see `effective_modulus`. `flat_stiffness` is the force per
-closure of a block with perfectly mating surfaces. `partial_slip` shears a pressed surface below sliding.
-Under them lies `solver`, on plain arrays, which the joints call: it is not listed, as users do not.
+closure of a block with perfectly mating surfaces. `partial_slip` shears a pressed surface below sliding, and
+`theories` returns what theories of rough contact predict. Under them lies `solver`, on plain arrays, which
+the joints call: it is not listed, as users do not.
 """
 
 import lazy_loader

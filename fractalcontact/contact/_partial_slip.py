@@ -102,9 +102,9 @@ def partial_slip(
     -------
     Dataset over `step`
         Coordinates tangential_force, and closure, normal_force and nominal_pressure of the normal load;
-        tangential_displacement, stick_area, slip_area, tangential_stiffness, dissipated_energy, iterations,
-        transforms, residual, converged, run_time; the maps; superposition_error, contact_area, nominal_area,
-        contact_modulus, poisson, friction_coefficient, disc_radius (for "disc").
+        tangential_displacement (m), stick_area, slip_area (m2), tangential_stiffness (N/m), dissipated_energy
+        (J), iterations, transforms, residual, converged, run_time; the maps; superposition_error,
+        contact_area, nominal_area, contact_modulus, poisson, friction_coefficient, disc_radius ("disc").
 
     Raises
     ------

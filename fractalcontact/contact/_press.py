@@ -111,10 +111,10 @@ def press(
     Returns
     -------
     Dataset over the leading dims and `step`
-        Coordinates closure, normal_force, nominal_pressure; contact_area, contact_fraction,
-        corrected_contact_fraction, mean_gap, elastic_energy, plastic_work (with a hardness), iterations,
-        transforms, residual, converged, stop_reason, run_time; the maps; nominal_area, contact_modulus,
-        rms_slope, disc_radius ("disc"). NaN where a periodic body is closed beyond its mean plane.
+        Coordinates closure, normal_force, nominal_pressure; contact_area (m2), contact_fraction,
+        corrected_contact_fraction, mean_gap (m), elastic_energy, plastic_work (J; with a hardness),
+        iterations, transforms, residual, converged, stop_reason, run_time (s); the maps; nominal_area (m2),
+        contact_modulus, rms_slope, disc_radius (m). NaN: a periodic body closed beyond its mean plane.
         "stiffness": contact_stiffness (Pa m-1), dp/dclosure of unloading; over E* relative_conductance (m-1).
         "pressure_distribution": maximum_pressure (Pa); over pressure_class area_share and load_share.
 
