@@ -136,7 +136,7 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     add = accuracy.add_argument_group("estimators").add_argument
     add("--hurst", type=float, nargs="+", help="exponents (default .1 .3 .5 .7 .9)")
     add("--sizes", type=int, nargs="+", help="points along an edge (default 64 256 1024)")
-    add("--families", nargs="+", help="fbm, spectral (default: both)")
+    add("--families", nargs="+", help="fbm, spectral, crop, matern, profile (default fbm spectral)")
     add("--methods", nargs="+", help="names from `fractalcontact methods` (default: all)")
     add("--members", type=int, nargs="+", help="surfaces for each case (default 25600 / size)")
     add("--seed", type=int, help="seed of the random stream")

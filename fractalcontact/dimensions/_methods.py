@@ -208,8 +208,8 @@ def methods() -> dict[str, str]:
     -------
     dict
         From name to description; the first is the default. "95 % interval" at the end means that the
-        coverage was validated: the interval holds the true exponent in 95 of 100 surfaces of the family
-        that is named.
+        interval holds the true exponent in 95 of 100 surfaces of the family that is named; "interval", that
+        it follows from the covariance of the curve, with the coverage on page `estimator_accuracy`.
 
     Examples
     --------

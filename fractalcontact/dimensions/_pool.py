@@ -81,7 +81,7 @@ def pool(scans: Any, method: str | None = None, *, model: str = "random") -> xr.
         For "random", results of `fractalcontact.dimensions.estimate`: one for each scan, or one over `scan`
         (or any dims), as the group `dimensions` of a study of many scans. For "common", surfaces.
     method : str, optional
-        The method to pool. Default: the first one.
+        The method to pool, for "random". Default: the first one.
     model : {"random", "common"}
         "random": exponents that scatter from scan to scan, of which the mean is asked (random effects). The
         scatter between scans is separated from the error within each; scans are weighted by their errors as
