@@ -41,17 +41,17 @@ def correlation_dimension(
     """Correlation dimension of a set of cells, from the pairs of cells at every distance.
 
     The mean number of cells of the set in a square (of a profile, an interval) of edge s about one of them
-    grows as s^D. Pairs are
-    counted by a Fourier transform. Each distance is corrected for the pairs that the edges of the plane and
-    unobserved cells leave out.
+    grows as s^D. Pairs are counted by a Fourier transform. Each distance is corrected for the pairs that the
+    edges of the plane and unobserved cells leave out.
 
     Parameters
     ----------
     mask : DataArray, dims (..., y, x), or (..., x) for the contact of a profile
         Boolean, or integer flags where contact means value > 0.
     box_sizes : sequence of int, optional
-        Edges of the squares in cells; by default the default sizes of `box_dimension`. A cell on the outline
-        of a square of an even number of cells counts by its part inside.
+        Edges of the squares in cells; by default products of 2 and 3 up to the geometric mean of the cell and
+        the extent, at least to 9. A cell on the outline of a square of an even number of cells counts by its
+        part inside.
     periodic : bool, optional
         Whether pairs wrap around the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional

@@ -43,7 +43,7 @@ def minkowski_dimension(
         Boolean, or integer flags where contact means value > 0.
     radii : sequence of float, optional
         Radii in cells (in sides of a square with the area of a cell), at least 1/2. By default half the
-        default sizes of `box_dimension`: a radius of 1/2 corresponds to a box of one cell.
+        default sizes of `correlation_dimension`: a radius of 1/2 corresponds to a box of one cell.
     periodic : bool, optional
         Whether distances wrap around the edges; by default along periodic axes. True needs periodic axes.
         Beyond a free edge the area is the mirror image of that on the other side of the nearest cell.

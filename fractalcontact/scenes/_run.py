@@ -73,10 +73,11 @@ def run(
     verbose : bool, default False
         Print all of it.
     workers : int, default 0
-        Share the study between so many processes on this machine, at most 4 for each processor. An ensemble
-        is shared by members, many scans by scan, any other study by the parts of a stage. A script needs an
-        ``if __name__ == "__main__"`` guard for it. With 0, a copy of this process takes part of the work on
-        surfaces of up to 1024 x 1024 points and of the figures (on Linux, with two processors or more).
+        Share the study between so many processes on this machine: at most 8, or 4 for each processor if these
+        are more. An ensemble is shared by members, many scans by scan, any other study by the parts of a
+        stage. A script needs an ``if __name__ == "__main__"`` guard for it. With 0, a copy of this process
+        takes part of the work on surfaces of up to 1024 x 1024 points and of the figures (on Linux, with two
+        processors or more).
     client : distributed.Client or concurrent.futures.Executor, optional
         Share it between these workers instead. Each task uses one thread, unless `FRACTALCONTACT_THREADS`
         is set on the worker. Workers need no access to `out`, but for many scans; a scene that reads files
