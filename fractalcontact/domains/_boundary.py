@@ -59,11 +59,11 @@ def boundary_dimension(
     Notes
     -----
     NaN without a boundary (an empty or a full plane), and where the set or its complement has no interior, as
-    a dust, a curve or a cluster of percolation: too few of its cells lie in whole blocks of 3 x 3 and 9 x 9
-    cells, and the pairs measure the set and not its boundary. `comment` states the reason. The interval is
-    NaN where one of the 16 blocks holds the whole boundary. The dimension is that at the scale of the cell: a
-    set smooth at that scale has the dimension 1 however rough it is at larger scales. Validation: see the
-    documentation, "Theory: contact domains".
+    scattered points, a curve or a cluster of percolation: too few of its cells lie in whole blocks of 3 x 3
+    and 9 x 9 cells, and the pairs measure the set and not its boundary. `comment` states the reason. The
+    interval is NaN where one of the 16 blocks holds the whole boundary. The dimension is that at the scale of
+    the cell: a set smooth at that scale has the dimension 1 however rough it is at larger scales. Validation:
+    see the documentation, "Theory: contact domains".
 
     Examples
     --------

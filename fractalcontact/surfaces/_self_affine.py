@@ -73,7 +73,7 @@ class SelfAffine:
         rms_height: float | None = None,
         rms_slope: float | None = None,
     ) -> SelfAffine:
-        """Return the spectrum with this rms height or, if that is None, this rms slope."""
+        """Return the spectrum with this rms height (m), else this rms slope, else a plateau of 1 m4."""
         unit = cls(hurst, long_cutoff, rolloff, short_cutoff)
         if rms_height is not None:
             plateau = rms_height**2 / unit.moment(0)
@@ -103,7 +103,8 @@ class SelfAffine:
     def moments(self) -> Moments:
         """Return the mean squares of height, gradient and Laplacian.
 
-        Their attributes are rms_height (m), rms_slope, rms_curvature (m-1) and nayak.
+        The result has their roots too, rms_height (m), rms_slope and rms_curvature (m-1, of the mean
+        curvature, half the Laplacian), and nayak, the parameter m0 m4 / m2^2.
         """
         return Moments(self.moment(0), self.moment(2), self.moment(4))
 
