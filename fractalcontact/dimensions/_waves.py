@@ -77,8 +77,9 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     seventh of a profile). Among N points a wave is found from an amplitude of about 11 sqrt(S / N) on, S
     being the power spectral density at its wavelength over the area of a cell. At 128 x 128 points that is
     0.15 rms increments at 6 spacings, 0.45 at 12 and 2 at 24 (H = 0.5); at 256 x 256 half of it or less.
-    Multiples of a wave that are shorter than two spacings are listed at their aliases. `estimate` removes
-    what is found. Detection and its limits: pages `theory_dimensions` and `estimator_accuracy`.
+    Of more than 1024 points along an axis the middle ones are searched. Multiples of a wave that are shorter
+    than two spacings are listed at their aliases. `estimate` removes what is found. Detection and its limits:
+    pages `theory_dimensions` and `estimator_accuracy`.
 
     References
     ----------
