@@ -10,7 +10,7 @@ Only the stages that the wanted results need are computed, imported, compiled an
                   Spikes are removed for the contact alone: the roughness is that of the surface as scanned,
                   unless nothing is pressed.
 ``[upper]``       the upper face, in the same way; without it the two faces match perfectly
-``[material]``    young, poisson (one value, or [lower, upper]), basic_friction_angle, hardness, yield_pressure
+``[material]``    young, poisson (a value, or [lower, upper]), basic_friction_angle, hardness, yield_pressure
 ``[joint]``       block, and the arguments of the functions of `joints` (shear, direction, normal_force ...);
                   ``[joint.closure]`` and so on give one stage its own values; ``register = true`` brings two
                   measured faces into mated position
