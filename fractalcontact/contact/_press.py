@@ -89,7 +89,7 @@ def press(
         Exactly one of them: approach from first touch (m), force (N), or force over the whole extent (Pa). A
         sequence is a load path, which may go up and down.
     boundary : {None, "periodic", "free"}
-        None: periodic where both axes of the surface are. A periodic surface may be declared free.
+        None: periodic where both axes are. "free" is always allowed, and needed where one axis alone is.
     influence : {None, "disc", "square", "spectral"}
         Influence coefficients of free bodies: rigid circular plates (the default) or uniform pressure on
         square cells (Love 1929); of periodic bodies: 2/(E* |q|).

@@ -100,14 +100,13 @@ def estimate(
         "psd" ("spectrum").
     scales : (low, high), optional
         Lengths in m between which to fit: wavelengths, lags, or edges of windows or cubes. Default: the
-        window of the method. "likelihood" takes the waves between as they are, without noise or blur, unless
-        these are given.
+        window of the method.
     noise : float, optional
-        Rms height in m of the white measurement noise, 0 for none ("likelihood" only). By default it is
-        estimated where the heights show it.
+        Rms height in m of the white measurement noise, 0 for none ("likelihood"; beside noise the other
+        methods have no interval). By default it is estimated where the heights show it; with `scales`, 0.
     psf : float, optional
         Standard deviation in m of the Gaussian point spread function of the instrument, 0 for none
-        ("likelihood" only). By default it is estimated where the heights show a blur.
+        ("likelihood" only). By default it is estimated where the heights show a blur; with `scales`, 0.
 
     Returns
     -------
