@@ -82,7 +82,8 @@ def dilatancy(
         Stiffness k of the spring per nominal area, Pa/m; `normal_force` is then N0. None: constant force.
     pressed : Dataset, optional
         A result of `closure` for the same crack and options: the shears at which it holds all the forces
-        (with a hardness: the path of the forces) are taken from it, the others pressed.
+        (with a hardness: the path of the forces) are taken from it, the others pressed. Not with `keep` or
+        `normal_stiffness`.
     bulk, keep, influence, disc_radius, hardness, tolerance, method
         As for `closure`; refused without a force.
     progress : bool
