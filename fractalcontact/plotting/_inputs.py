@@ -113,7 +113,7 @@ def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     with Problems("fc.plotting") as problems:
         for dim, size in others.items():
             problems.require(size == 1, f"result.{name}", f"one {dim}; choose with .sel or .isel", size)
-    repeated = {dim: data.sizes[dim] for dim in dims if dim not in variable.dims}
+    repeated = {dim: data.sizes.get(dim, 1) for dim in dims if dim not in variable.dims}
     variable = variable.isel(dict.fromkeys(others, 0)).expand_dims(repeated)
     return np.asarray(variable.transpose(*dims).values, dtype=np.float64)
 

@@ -74,6 +74,14 @@ def test_interval_of_a_variable_without_values():
     assert ax.get_xlim()[0] > 0
 
 
+def test_load_of_a_path_at_one_shear():
+    """It is a coordinate, the data of which are no variable that could get a dim."""
+    closed = synthetic.closure(synthetic.delta(synthetic.heights()))
+    load = closed.isel(shear=0, drop=True)["normal_force"]
+    line = plotting.plot(load).get_lines()[0]
+    assert np.array_equal(line.get_xdata(), line.get_ydata())
+
+
 def test_empty_domain():
     closed = synthetic.closure(synthetic.delta(synthetic.heights()))
     empty = closed.assign(state=closed.state * 0)
