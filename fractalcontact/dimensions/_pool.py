@@ -195,7 +195,7 @@ def _of_results(results: list[xr.Dataset], method: str | None) -> _Scans:
 
 
 def _of_surfaces(surfaces: list[xr.DataArray]) -> _Scans:
-    singles = [single for surface in surfaces for single in read_surfaces(surface)]
+    singles = [single.middle() for surface in surfaces for single in read_surfaces(surface)]
     records = [likelihood(single, None, None) for single in singles]
     return _Scans(
         np.array([record.hurst for record in records]),
