@@ -341,22 +341,24 @@ def _null(
         if plane == 0 or (planes.valid is not None and plane < len(planes.valid)):
             boxes = _random_null.NullBoxes(planes, plane, sizes, cover)
             small_boxes = _random_null.NullBoxes(planes, plane, small, "mean")
+            of_small: dict[int, tuple[Array, Array]] = {}
+            of_window: dict[tuple[int, int, int], tuple[Array, float, float]] = {}
+        window, k = windows[plane], int(cells)
+        same = k, window.start, window.stop
         random_cells = _random_null.RandomCells(cells, observed, largest)
-        null = boxes.expected_counts(random_cells, sizes)
-        used, part = sizes[windows[plane]], null[windows[plane]]
-        fit = partial(_null_dimension, used, by_regression=by_regression)
-        dimension, deviation, differs = fit(part), np.nan, False
+        if same not in of_window:  # planes of as many cells have the same null
+            null = boxes.expected_counts(random_cells, sizes)
+            fit = _null_fit(boxes, random_cells, null[window], sizes[window], by_regression=by_regression)
+            of_window[same] = null, *fit
+        null, dimension, deviation = of_window[same]
+        is_different = False
         if np.isfinite(dimension):
-            knots = _knots(used)
-            covariance = boxes.covariance(random_cells, used[knots])
-            deviation = _random_null.dimension_deviation(fit, used, part, knots, covariance)
-            differs = _random_null.differs_from_null(
-                mean[plane],
-                small_boxes.expected_counts(random_cells, small),
-                small_boxes.covariance(random_cells, small),
-            )
+            if k not in of_small:
+                expected = small_boxes.expected_counts(random_cells, small)
+                of_small[k] = expected, small_boxes.covariance(random_cells, small)
+            is_different = _random_null.differs_from_null(mean[plane], *of_small[k])
         counts.append(null)
-        rows.append((dimension, deviation, differs))
+        rows.append((dimension, deviation, is_different))
     dimension, deviation, differs = np.array(rows, float).T
     return {
         "null_count": np.array(counts),
@@ -364,6 +366,24 @@ def _null(
         "null_spread": deviation,
         "differs_from_random": differs.astype(bool),
     }
+
+
+def _null_fit(
+    boxes: _random_null.NullBoxes,
+    random_cells: _random_null.RandomCells,
+    counts: Array,
+    sizes: Array,
+    *,
+    by_regression: bool,
+) -> tuple[float, float]:
+    """Return the dimension of the expected counts of a null, and its standard deviation."""
+    fit = partial(_null_dimension, sizes, by_regression=by_regression)
+    dimension = fit(counts)
+    if not np.isfinite(dimension):
+        return dimension, np.nan
+    knots = _knots(sizes)
+    covariance = boxes.covariance(random_cells, sizes[knots])
+    return dimension, _random_null.dimension_deviation(fit, sizes, counts, knots, covariance)
 
 
 def _null_dimension(sizes: Array, counts: Array, *, by_regression: bool) -> float:
