@@ -46,8 +46,10 @@ def part(tree, *paths):
 
 @pytest.fixture(scope="module")
 def written(study, tmp_path_factory):
-    """The files of the complete study, in a folder that did not exist."""
-    return plotting.draw(study, tmp_path_factory.mktemp("study") / "new")
+    """The files of the complete study, in a folder that did not exist; two processes draw them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FRACTALCONTACT_THREADS", "2")
+        return plotting.draw(study, tmp_path_factory.mktemp("study") / "new")
 
 
 def test_complete_study(written):
@@ -109,7 +111,6 @@ def test_closure_without_maps(study, tmp_path):
 
 def test_letters_match_between_curve_and_maps(study, tmp_path, monkeypatch):
     """The steps that are marked on the closure law are those of the maps of contact domains."""
-    monkeypatch.setenv("FRACTALCONTACT_THREADS", "1")
     shown = {}
 
     def keep(canvas, path, **options):

@@ -16,7 +16,6 @@ FACTORS = np.array([0.01, 0.02, 0.03, 0.05, 0.09])
 @pytest.fixture
 def drawn(monkeypatch, tmp_path):
     """Draw a tree and return what its figures show: curves, corners of bands, and all words."""
-    monkeypatch.setenv("FRACTALCONTACT_THREADS", "1")  # no copy of this process draws some of them
 
     def draw(tree):
         shown = {}
