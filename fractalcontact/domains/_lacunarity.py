@@ -270,7 +270,7 @@ def box_moments(planes: Planes, boxes: Array, masses: Array | None = None) -> tu
 def _box_sums(cells: Array, valid: Array | None, boxes: Array, periodic: Sequence[bool]) -> Array:
     """Return positions, hits, masses and squared masses of one plane for all boxes, (4, boxes, blocks)."""
     (ny, nx), (wrap_y, wrap_x) = cells.shape, periodic
-    sums = np.zeros((4, len(boxes), BLOCKS if ny == 1 else BLOCKS * BLOCKS))
+    sums = np.zeros((len(boxes), 4, BLOCKS if ny == 1 else BLOCKS * BLOCKS))
     observed = np.zeros((0, 0), np.uint8) if valid is None else valid
     for box, (height, width) in enumerate(boxes.tolist()):
         rows, across = ny if wrap_y else ny - height + 1, nx if wrap_x else nx - width + 1
@@ -279,8 +279,8 @@ def _box_sums(cells: Array, valid: Array | None, boxes: Array, periodic: Sequenc
         # masses are exact integers; their squares along a row too, unless the box is longer than 2^14 cells
         is_exact = cells.dtype == np.uint8 and (height * width) ** 2 * across <= LARGEST_INT64
         columns = np.zeros(nx, np.int32 if is_exact and nx * height <= LARGEST_INT32 else np.float64)
-        glide(cells, observed, height, width, rows, across, columns, sums[:, box])
-    return sums
+        glide(cells, observed, height, width, rows, across, columns, sums[box])
+    return sums.swapaxes(0, 1)
 
 
 def half_width(replicates: Array) -> Array:

@@ -133,7 +133,7 @@ def _count_offsets(
     above, below = np.empty((2, *cells.shape), np.int16 if is_short else np.int32)
     for distance, is_backward in ((above, False), (below, True)):
         rows_to_set(cells, reach[0], periodic[0], is_backward, distance)
-    observed = np.broadcast_to(np.uint8(1), cells.shape) if valid is None else valid
+    observed = np.zeros((0, 0), np.uint8) if valid is None else valid
     # in squares of the shorter spacing, rounded: equal distances are then equal in any unit; 4 and 9 decimals
     # gave the same bits
     shorter = min(steps)
@@ -168,14 +168,17 @@ def rows_to_set(cells: Array, reach: int, wrap: bool, is_backward: bool, distanc
     """
     ny, nx = cells.shape
     far = reach + 1
-    last = np.full(nx, far, distance.dtype)
+    last = np.empty(nx, distance.dtype)
+    for j in range(nx):
+        last[j] = far
     for k in range(-reach if wrap else 0, ny):
         i = ny - 1 - k if is_backward else k
         row = cells[i % ny]
         for j in range(nx):
             last[j] = 0 if row[j] else min(last[j] + 1, far)
         if k >= 0:
-            distance[i] = last
+            for j in range(nx):
+                distance[i, j] = last[j]
 
 
 @kernel
@@ -194,12 +197,13 @@ def count_offsets(
     `above` and `below` are those of `rows_to_set`; `high` and `wide` are the squared distances of so many
     rows and columns, and `counts` (rows, columns) int64 is added to. Columns are searched outwards, until
     none can be as near. Unobserved cells do not count; a cell counts twice if its mirror images about the
-    nearest cells of the set all lie outside, or were not observed.
+    nearest cells of the set all lie outside, or were not observed. `valid` is empty where everything was.
     """
     ny, nx = above.shape
+    has_gaps = valid.size > 0
     for i in range(ny):
         for j in range(nx):
-            if valid[i, j] == 0:
+            if has_gaps and valid[i, j] == 0:
                 continue
             if above[i, j] == 0:
                 counts[0, 0] += 1
@@ -226,8 +230,8 @@ def count_offsets(
                         continue
                     up, down = i - 2 * height, i + 2 * height
                     if above[i, other] == height and (wrap_y or up >= 0):
-                        has_mirror |= valid[up % ny, x % nx] != 0
+                        has_mirror |= not has_gaps or valid[up % ny, x % nx] != 0
                     if below[i, other] == height and (wrap_y or down < ny):
-                        has_mirror |= valid[down % ny, x % nx] != 0
+                        has_mirror |= not has_gaps or valid[down % ny, x % nx] != 0
             if best < np.inf:
                 counts[rows, columns] += 1 if has_mirror else 2
