@@ -58,6 +58,23 @@ def test_null_counts_and_spread_match_realisations():
     )
 
 
+@pytest.mark.parametrize("cover", ["mean", "aligned"])
+def test_null_of_planes_with_as_many_cells_is_that_of_each_alone(cover):
+    """The null is fitted once for planes with as many cells in the same window, here in one of their own."""
+    rng = np.random.default_rng(35)
+    planes = (
+        np.array([random_null(64, 900, rng), level_set(64, 0.9, 900 / 4096, rng), np.zeros((64, 64))]) > 0
+    )
+    planes[2, 10:40, 20:50] = True
+    assert (planes.sum((1, 2)) == 900).all()
+    together = fc.domains.box_dimension(as_mask(planes), cover=cover, window="each")
+    assert np.unique(together.window_high).size > 1
+    for k, plane in enumerate(planes):
+        alone = fc.domains.box_dimension(as_mask(plane), cover=cover, window="each")
+        for name in ("null_count", "null_dimension", "null_spread", "differs_from_random"):
+            assert np.array_equal(together[name][k], alone[name]), (name, k)
+
+
 CASES = [  # cells a side, coverage, sizes, cover; the expected counts must scatter, not be one or all
     (40, 0.05, None, "mean"),
     (64, 0.2, None, "mean"),
