@@ -13,6 +13,7 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from study import SOUND, watch_calls
 
 import fractalcontact as fc
@@ -134,7 +135,9 @@ figures = true
 
 
 @pytest.mark.parametrize("word", ["../../escaped", "/tmp/fractalcontact_escaped", "$(touch escaped)"])
-def test_nothing_is_written_outside_the_folder(tmp_path, word):
+def test_nothing_is_written_outside_the_folder(tmp_path, word, monkeypatch):
+    if "/" in word:  # nothing but the names of the files; the last one draws the figures as well
+        monkeypatch.setattr("fractalcontact.plotting._draw._draw_row", lambda row, tree: Figure((1.0, 1.0)))
     folder = tmp_path / "study"
     folder.mkdir()
     (folder / "scene.toml").write_text(SCENE.format(word=word), encoding="utf-8")
