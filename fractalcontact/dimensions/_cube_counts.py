@@ -75,7 +75,7 @@ def cube_counts(surface: xr.DataArray, *, vertical_scale: float | str = "range")
     """
     factor = vertical_scale if isinstance(vertical_scale, str) else float(vertical_scale)
     return curve_dataset(
-        surface, lambda single: cube_count_curve(single, None, factor), "cube_size", "cube_count"
+        surface, lambda single: cube_count_curve(single, None, factor), "cube_size", "cube_count", count=None
     )
 
 
@@ -168,7 +168,9 @@ def covering(surface: xr.DataArray, *, vertical_scale: float = 1.0) -> xr.Datase
     """
     factor = float(vertical_scale)
     name = _NAMES[2 if "y" in surface.dims else 1]
-    return curve_dataset(surface, lambda single: covering_curve(single, None, factor), "cube_size", name)
+    return curve_dataset(
+        surface, lambda single: covering_curve(single, None, factor), "cube_size", name, count=None
+    )
 
 
 def covering_curve(surface: Surface, window: Scales = None, vertical_scale: float = 1.0) -> Curve:

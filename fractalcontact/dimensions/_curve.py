@@ -112,7 +112,7 @@ def curve_dataset(
     dim: str,
     value: str,
     *,
-    count: str | None = None,
+    count: str | None = "pair_count",
     slope: Callable[[Curve], Array] | None = None,
 ) -> xr.Dataset:
     """Measure the curves of all surfaces and stack them along the leading dims of the input.
@@ -153,8 +153,6 @@ def window_slope(curve: Curve) -> Array:
     """Return the local slope; relative to the first value, a constant curve has slope 0 to the last bit."""
     return local_slope(curve.scale, curve.value / (curve.value[:1] if (curve.value > 0).all() else 1.0))
 
-
-Expected = Callable[[float], Array]
 
 _CORRELATED = "the points of the curve are correlated, so the scatter about a straight line gives no interval"
 _INCOMPLETE = (
@@ -217,11 +215,8 @@ def fit(method: Method, surface: Surface, scales: Scales, noise: float | None) -
     low, high = normal_interval(hurst, error)
     estimate = replace(estimate, hurst=hurst, standard_error=error, ci_low=low, ci_high=high, reason="")
     estimate = replace(estimate, misfit=_misfit(x, y - expected(middle), covariance))
-    if noise:
-        return estimate.without_interval(NO_NOISE)
-    return (
-        estimate if not estimate.misfit > SIGNIFICANT else estimate.without_interval(misfit_reason(estimate))
-    )
+    reason = NO_NOISE if noise else misfit_reason(estimate) if estimate.misfit > SIGNIFICANT else ""
+    return estimate.without_interval(reason) if reason else estimate
 
 
 def misfit_reason(estimate: Estimate) -> str:

@@ -24,20 +24,9 @@ from fractalcontact.dimensions._surface_input import Surface, check_surface, is_
 _MOST_MISSING = 0.5  # share of the heights
 _LEAST_MODES, _LEAST_BINS = 12, 2  # of an octave
 _EXPONENTS = np.linspace(-2.0, 4.0, 1201)  # that are compared: between them chi square is a parabola
-_NAMES = (
-    "hurst",
-    "ci_low",
-    "ci_high",
-    "mode_count",
-    "in_window",
-    "wavelength",
-    "window_hurst",
-    "window_ci_low",
-    "window_ci_high",
-    "scale_min",
-    "scale_max",
-    "run_time",
-)
+_FIELDS = ("hurst", "ci_low", "ci_high")
+_OF_WINDOW = (*(f"window_{name}" for name in _FIELDS), "scale_min", "scale_max")
+_NAMES = (*_FIELDS, "mode_count", "in_window", "wavelength", *_OF_WINDOW, "run_time")
 
 
 def _check(problems: Problems) -> None:
@@ -107,30 +96,19 @@ def scaling(surface: xr.DataArray) -> xr.Dataset:
         return (*leading, *dims), array.reshape((*sizes, *array.shape[1:]))
 
     data = {
-        name: stacked([[getattr(fit, field) for fit in record.fits] for record in records], "wavelength")
-        for name, field in (("hurst", "hurst"), ("ci_low", "low"), ("ci_high", "high"))
+        name: stacked([record.fits[:, k] for record in records], "wavelength")
+        for k, name in enumerate(_FIELDS)
     }
     data["mode_count"] = stacked([record.modes for record in records], "wavelength")
     data["in_window"] = stacked([record.in_window for record in records], "wavelength")
-    for name, field in (("window_hurst", "hurst"), ("window_ci_low", "low"), ("window_ci_high", "high")):
-        data[name] = stacked([getattr(record.window, field) for record in records])
-    for end, name in enumerate(("scale_min", "scale_max")):
-        data[name] = stacked([record.scales[end] for record in records])
+    for k, name in enumerate(_OF_WINDOW):
+        data[name] = stacked([record.whole[k] for record in records])
     coords = {**leading_coords(surface, leading, _NAMES), "wavelength": octaves.middle * first.spacing[1]}
     result = xr.Dataset(data, coords=coords)
     if reasons := dict.fromkeys(record.reason for record in records if record.reason):
         for name in ("window_ci_low", "window_ci_high"):
             result[name].attrs["reason"] = "; ".join(reasons)
     return result
-
-
-@dataclass(frozen=True)
-class _PowerLaw:
-    """Exponent of some bins, and its 95 % interval."""
-
-    hurst: float = math.nan
-    low: float = math.nan
-    high: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -159,24 +137,22 @@ class _Octaves:
 
 @dataclass(frozen=True)
 class _Record:
-    """Exponents of the octaves of one surface, and of the whole."""
+    """Exponents of the octaves of one surface, each with its interval, and `_OF_WINDOW` of the whole."""
 
-    fits: list[_PowerLaw]
+    fits: Array
     modes: Array
-    window: _PowerLaw
     in_window: Array
-    scales: tuple[float, float]
+    whole: tuple[float, ...]
     reason: str
 
 
 def _record(surface: Surface, octaves: _Octaves) -> _Record:
     """Fit the octaves of one surface."""
-    none = np.zeros(octaves.number, dtype=np.int64)
-    undefined = [_PowerLaw()] * octaves.number
+    none, fits = np.zeros(octaves.number, dtype=np.int64), np.full((octaves.number, 3), np.nan)
     first = None if surface.is_constant or surface.is_plane else first_fit(surface)
     fit = None if first is None else first.modes
     if fit is None or not fit.keep.any():
-        return _Record(undefined, none, _PowerLaw(), none > 0, (math.nan, math.nan), "")
+        return _Record(fits, none, none > 0, (math.nan,) * len(_OF_WINDOW), "")
     bins = fit.bins()
     owner, mode_owner = octaves.index(bins.lnq), octaves.index(np.log(fit.lattice.q[fit.keep]))
     modes = np.bincount(mode_owner, minlength=octaves.number)
@@ -187,11 +163,12 @@ def _record(surface: Surface, octaves: _Octaves) -> _Record:
         hypothesis, _, theta = whole.posterior.most_probable
         form = hypothesis.form
     logs = _log_power(bins, form if theta[SPREAD] == 0.0 else ALIASED)
-    fits = [_fitted(bins, logs, owner == k) if is_there[k] else _PowerLaw() for k in range(octaves.number)]
+    for k in np.flatnonzero(is_there):
+        fits[k] = _fitted(bins, logs, owner == k)
     lengths = octaves.middle * surface.spacing[1]
     in_window = (lengths >= whole.scale_min / 2.0**0.5) & (lengths <= whole.scale_max * 2.0**0.5)
-    window = _PowerLaw(whole.hurst, whole.ci_low, whole.ci_high)
-    return _Record(fits, modes, window, in_window, (whole.scale_min, whole.scale_max), whole.reason)
+    ends = whole.hurst, whole.ci_low, whole.ci_high, whole.scale_min, whole.scale_max
+    return _Record(fits, modes, in_window, ends, whole.reason)
 
 
 def _log_power(bins: Bins, form: int) -> Array:
@@ -207,8 +184,8 @@ def _log_power(bins: Bins, form: int) -> Array:
     return logs
 
 
-def _fitted(bins: Bins, logs: Array, chosen: Array) -> _PowerLaw:
-    """Return the exponent of some bins: chi square of each exponent, at its best amplitude."""
+def _fitted(bins: Bins, logs: Array, chosen: Array) -> tuple[float, float, float]:
+    """Return the exponent of some bins and its interval: chi square of each, at its best amplitude."""
     weight = 1.0 / bins.variance[chosen]
     residual = bins.level[chosen] - logs[:, chosen]
     residual -= (residual @ weight / weight.sum())[:, None]
@@ -221,4 +198,4 @@ def _fitted(bins: Bins, logs: Array, chosen: Array) -> _PowerLaw:
     low = float(np.interp(-limit, -chi_square[: k + 1], _EXPONENTS[: k + 1]))
     high = float(np.interp(limit, chi_square[k:], _EXPONENTS[k:]))
     hurst = float(_EXPONENTS[k] + step * np.clip(shift, -1.0, 1.0))
-    return _PowerLaw(hurst, low, high)
+    return hurst, low, high

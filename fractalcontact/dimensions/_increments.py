@@ -56,14 +56,9 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
     first, second = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(first) > 0:
         return undefined(CONSTANT)
-    rule = "the shortest lags, which carry nearly all information on H" if scales is None else "asked for"
-    if asked is None and scales is not None:
-        rule = "the shortest lags that the points resolve"
-    window: dict[str, Any] = {
-        "scale_min": float(lags[is_inside].min()),
-        "scale_max": float(lags[is_inside].max()),
-        "window": rule,
-    }
+    shortest = "the shortest lags that the points resolve, which carry nearly all information on H"
+    window: dict[str, Any] = {"window": shortest if asked is None else "asked for"}
+    window["scale_min"], window["scale_max"] = (float(end) for end in np.sort(lags[is_inside])[[0, -1]])
     rounding = 0.0 if surface.is_lazy else 4.0 * np.spacing(abs(float(surface.raw[0, 0])))
     if not np.nansum(second) > max(1e-22 * np.nansum(first), rounding**2):
         return replace(plane(), **window)

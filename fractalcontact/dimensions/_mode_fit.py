@@ -238,13 +238,7 @@ def _tapered(heights: Array, lattice: Lattice, is_complete: bool) -> tuple[Latti
 
 
 def log_ratio(
-    levels: Levels,
-    before: Array,
-    slope: float,
-    information: float = 1.0,
-    *,
-    deviation: float = math.inf,
-    rounds: int = 30,
+    levels: Levels, before: Array, slope: float, information: float = 1.0, *, deviation: float = math.inf
 ) -> tuple[Array, Array, float]:
     """Return the log ratio of lengths (u, v) that levels by azimuth show.
 
@@ -262,8 +256,6 @@ def log_ratio(
         Of a mode.
     deviation : float
         Of the prior of u and v. Where the slope is small, as on a plateau, levels tell little of lengths.
-    rounds : int
-        Steps at most; 2 to 10 are needed. Of 64 x 64 points under a lay of 8 to 1 some do not end.
 
     Returns
     -------
@@ -287,7 +279,7 @@ def log_ratio(
         return np.asarray(values - weight @ values / weight.sum())
 
     target = levels.level + logs(before)
-    for _ in range(rounds):
+    for _ in range(30):  # 2 to 10 are needed; of 64 x 64 points under a lay of 8 to 1 some do not end
         here = logs(uv)
         columns = np.stack([(logs(uv + move) - here) / 1e-4 for move in 1e-4 * np.eye(2)[:free]], axis=1)
         variance[:free, :free] = np.linalg.pinv(

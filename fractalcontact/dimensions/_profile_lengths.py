@@ -56,7 +56,7 @@ def divider(surface: xr.DataArray) -> xr.Dataset:
     >>> fc.dimensions.divider(ramp).divider_length.values.round(9).tolist()
     [40.0, 40.0, 40.0]
     """
-    return curve_dataset(surface, divider_curve, "divider", "divider_length", count="pair_count")
+    return curve_dataset(surface, divider_curve, "divider", "divider_length")
 
 
 def divider_curve(surface: Surface, window: Scales = None) -> Curve:
@@ -122,7 +122,7 @@ def higuchi(surface: xr.DataArray) -> xr.Dataset:
     >>> curve.higuchi_length.values[:3].tolist(), round(float(curve.local_slope[1]), 6)
     ([16.0, 8.0, 5.333333333333333], -1.0)
     """
-    return curve_dataset(surface, higuchi_curve, "lag", "higuchi_length", count="pair_count")
+    return curve_dataset(surface, higuchi_curve, "lag", "higuchi_length")
 
 
 def higuchi_curve(surface: Surface, window: Scales = None) -> Curve:

@@ -64,7 +64,7 @@ def roughness_length(surface: xr.DataArray) -> xr.Dataset:
     >>> bool(fc.dimensions.roughness_length(tilted).roughness.max() < 1e-6)
     True
     """
-    return curve_dataset(surface, roughness_length_curve, "window_size", "roughness", count="pair_count")
+    return curve_dataset(surface, roughness_length_curve, "window_size", "roughness")
 
 
 def roughness_length_curve(surface: Surface, window: Scales = None) -> Curve:
@@ -229,9 +229,7 @@ def detrended_fluctuation(surface: xr.DataArray) -> xr.Dataset:
     >>> bool(fc.dimensions.detrended_fluctuation(tilted).fluctuation.max() < 1e-12)
     True
     """
-    return curve_dataset(
-        surface, detrended_fluctuation_curve, "window_size", "fluctuation", count="pair_count"
-    )
+    return curve_dataset(surface, detrended_fluctuation_curve, "window_size", "fluctuation")
 
 
 def detrended_fluctuation_curve(surface: Surface, window: Scales = None) -> Curve:

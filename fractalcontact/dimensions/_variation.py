@@ -101,7 +101,7 @@ def variation(
         edges = None if lengths is None else _edges_of(single, lengths)
         return variation_curve(single, None, edges, windows == "squares", mean == "geometric")
 
-    return curve_dataset(surface, measured, "window_size", "variation", count="pair_count")
+    return curve_dataset(surface, measured, "window_size", "variation")
 
 
 def _edges_of(surface: Surface, sizes: Array) -> Array:
@@ -204,13 +204,7 @@ def height_lacunarity(surface: xr.DataArray, *, mass: str = "range") -> xr.Datas
     >>> fc.dimensions.height_lacunarity(ramp).lacunarity.values.tolist()
     [1.0, 1.0]
     """
-    return curve_dataset(
-        surface,
-        lambda single: lacunarity_curve(single, mass),
-        "window_size",
-        "lacunarity",
-        count="pair_count",
-    )
+    return curve_dataset(surface, lambda single: lacunarity_curve(single, mass), "window_size", "lacunarity")
 
 
 def lacunarity_curve(surface: Surface, mass: str) -> Curve:

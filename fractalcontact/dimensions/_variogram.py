@@ -107,12 +107,7 @@ def variogram(
     if curves is None:
         curves = [measure(single, longest) for single in surfaces]
     return curve_dataset(
-        surface,
-        curves,
-        "lag",
-        name,
-        count="pair_count",
-        slope=lambda curve: local_slope(curve.scale, curve.value),
+        surface, curves, "lag", name, slope=lambda curve: local_slope(curve.scale, curve.value)
     )
 
 
@@ -146,14 +141,8 @@ def _square_increments(surface: Surface, longest: float | None) -> Curve:
     # a lag along y alone is listed with both signs, and so is a lag of half a period
     is_twice = (x == 0) | (periodic[1] & (2 * x == surface.shape[1]))
     weight = np.where(is_twice, 1, 2)
-    lag, mean, pairs = _rings(
-        distance.ravel(),
-        squares.ravel(),
-        (weight * counts).ravel(),
-        (weight * nominal).ravel(),
-        width,
-        longest,
-    )
+    flat = distance.ravel(), squares.ravel(), (weight * counts).ravel(), (weight * nominal).ravel()
+    lag, mean, pairs = _rings(*flat, width, longest)
     return Curve(lag, 0.5 * surface.unit**2 * mean, pairs // 2)
 
 
