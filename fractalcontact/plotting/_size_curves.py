@@ -11,6 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.units import Scale
+from fractalcontact.base.validation import require
 from fractalcontact.plotting import _maps, _paths, _style
 from fractalcontact.plotting._figure import StudyFigure, figure
 from fractalcontact.plotting._inputs import (
@@ -78,6 +79,7 @@ def signature(
     nulls = [name for name in NULLS if name in data]
     over = next((name for name in ("side", *IN_CELLS) if name in data["local_slope"].dims), "box_size")
     require_dims(data, dict.fromkeys(("local_slope", *nulls), over))
+    require(data.sizes[over] > 0, f"result.{over}", "at least one entry")
     for name in nulls[:1]:
         _, dim, constant, sign = NULLS[name]
         require_variables(data, [dim])

@@ -8,7 +8,8 @@ import pytest
 import xarray as xr
 from plotting_figures import render
 
-from fractalcontact import plotting
+from fractalcontact import domains, plotting, surfaces
+from fractalcontact.base.errors import InvalidInput
 from fractalcontact.base.schema import label
 
 CASES = {
@@ -80,6 +81,13 @@ def test_load_of_a_path_at_one_shear():
     load = closed.isel(shear=0, drop=True)["normal_force"]
     line = plotting.plot(load).get_lines()[0]
     assert np.array_equal(line.get_xdata(), line.get_ydata())
+
+
+def test_signature_without_a_box_size_is_refused():
+    mask = np.random.default_rng(1).random((32, 32)) > 0.7
+    result = domains.signature(surfaces.from_array(mask.astype(float), 1e-3) > 0.5)
+    with pytest.raises(InvalidInput, match="result.side: expected at least one entry"):
+        plotting.signature(result.isel(side=slice(0, 0)))
 
 
 def test_empty_domain():
