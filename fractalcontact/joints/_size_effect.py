@@ -23,6 +23,7 @@ from fractalcontact.joints._friction import LOCKED
 from fractalcontact.joints._sheared_contact import (
     PRESS_BYTES,
     JointProblem,
+    ShearedContact,
     check_problem,
     check_unpressed,
     closure_columns,
@@ -108,8 +109,9 @@ def self_weight(
 
     Notes
     -----
-    tau = gamma L tan(phi_basic + atan(delta(gamma L, v)/v)): the mean angle over the whole shear. Over a
-    shorter shear the angle of fractal faces is larger: compare only strengths over equal shears.
+    tau = gamma L tan(phi_basic + atan((delta(gamma L, v) - delta(gamma L, 0))/v)): the mean angle over the
+    whole shear; mated faces have no delta at 0. Over a shorter shear the angle of fractal faces is larger:
+    compare only strengths over equal shears.
 
     References
     ----------
@@ -135,18 +137,21 @@ def self_weight(
     pressures, dims = float(unit_weight) * sizes, ("direction", "shear", "structure_size")
     lifted, _ = rigid_dilatancies(crack, shears, directions)
     opening = np.repeat(lifted[..., None], sizes.size, axis=-1)
+    at_rest: Array = np.zeros(sizes.size)
     variables: dict[str, Any] = {}
     attributes: dict[str, Any] = {"references": BORRI_BRUNETTO_1998}
     if problem is not None:
         columns = closure_columns(problem, shears, directions)
         opening -= columns["interface_closure"]
+        unsheared = ShearedContact.of_crack(problem, 0.0, directions[0]).press(problem.load)
+        at_rest = -unsheared["interface_closure"]
         for name in ("residual", "converged", "rms_slope"):
             variables[name] = dims[: columns[name].ndim], columns[name]
         attributes = {
             "references": problem.references,
-            "achieved_residual": float(columns["residual"].max()),
+            "achieved_residual": float(max(columns["residual"].max(), unsheared["residual"].max())),
         }
-    angle = crack.basic_friction_angle + np.degrees(np.arctan(opening / shears[:, None]))
+    angle = crack.basic_friction_angle + np.degrees(np.arctan((opening - at_rest) / shears[:, None]))
     strength = pressures * np.tan(np.radians(np.where(angle < 90.0, angle, math.nan)))
     exponents = [
         fitted_slope(sizes, row) if sizes.size > 1 and (row > 0).all() else math.nan  # False for NaN

@@ -39,6 +39,30 @@ def test_follows_from_the_dilatancy_under_the_weight(crack):
     assert slope < 0.999  # larger structures close the joint
 
 
+def test_two_faces_climb_from_where_the_weight_has_closed_them():
+    """Two different faces are closed before they slide: that is no angle of dilatancy."""
+    lower, other = (
+        fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=2e-6, rng=seed) for seed in (1, 2)
+    )
+    crack = fc.joints.Crack(
+        lower, lower + other, young=3e10, poisson=0.2, block=2e-3, basic_friction_angle=30
+    )
+    sizes = np.array([10.0, 400.0])
+    result = fc.joints.self_weight(
+        crack, structure_size=sizes, unit_weight=GAMMA, shear=2e-4, direction=["E", "N"]
+    )
+    climb = fc.joints.dilatancy(
+        crack,
+        shear=[0, 2e-4],
+        direction=["E", "N"],
+        normal_force=(GAMMA * sizes * crack.nominal_area).tolist(),
+    )
+    secant = fc.joints.friction(climb, distance=2e-4).peak_friction_angle
+    np.testing.assert_allclose(result.friction_angle.isel(shear=0), secant, rtol=1e-9)
+    np.testing.assert_allclose(result.dilatancy.isel(shear=0), climb.dilatancy.isel(shear=1), rtol=1e-9)
+    assert (climb.dilatancy.isel(shear=0) < -1e-7).all()
+
+
 def test_locked_faces_have_no_strength(make_face):
     slope = 2.0 * np.arange(40.0) * np.ones((6, 1))  # 63 degree
     crack = fc.joints.Crack(make_face(slope), young=3e10, poisson=0.2, block=(6, 20), basic_friction_angle=30)
