@@ -1,5 +1,7 @@
 """Random midpoint displacement: exact first stages, symmetry, the documented errors."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -44,11 +46,13 @@ def test_both_axes_have_the_same_statistics(covariance_of):
 
 
 TABLE = {  # relative errors of the mean square increment at lags 1, 8, 64, as documented
+    (False, 0.01): (0.04, 1.22, 2.33),
     (False, 0.1): (0.04, 0.73, 1.18),
     (False, 0.3): (0.02, 0.08, 0.07),
     (False, 0.5): (-0.02, -0.24, -0.27),
     (False, 0.7): (-0.10, -0.37, -0.38),
     (False, 0.9): (-0.23, -0.37, -0.36),
+    (True, 0.01): (0.05, 1.24, 2.45),
     (True, 0.1): (0.04, 0.75, 1.23),
     (True, 0.3): (0.02, 0.09, 0.11),
     (True, 0.5): (-0.02, -0.23, -0.25),
@@ -67,6 +71,14 @@ def test_documented_errors(additions, hurst):
         squares = np.mean((heights[:, :, lag:] - heights[:, :, :-lag]) ** 2, axis=(1, 2)) / lag ** (2 * hurst)
         error = squares.std() / np.sqrt(600)
         assert abs(squares.mean() - 1 - expected) < 4 * error + 0.005 + 4 * error * np.sqrt(600 / 1500)
+
+
+@pytest.mark.parametrize(("hurst", "error"), [(0.01, 2), (0.1, 1), (0.5, 0.3), (0.9, 0.4)])
+def test_the_stated_error_is_the_documented_one(hurst, error):
+    documented = max(abs(TABLE[additions, hurst][-1]) for additions in (False, True))
+    assert error == pytest.approx(documented, rel=0.2)
+    stated = json.loads(midpoint((9, 9), hurst=hurst).attrs["provenance"])["achieved_error"]
+    assert stated == f"about {error:g} of the mean square increments over 64 points"
 
 
 @pytest.mark.parametrize(
