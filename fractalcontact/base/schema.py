@@ -331,7 +331,7 @@ QUANTITIES: dict[str, Quantity] = {
     "interpolation_error": Quantity("m", "rms interpolation error for shifts of a fraction of a cell"),
     "aperture": Quantity("m", "mechanical aperture"),
     "correlation": Quantity("1", "correlation of the facing heights"),
-    "structure_function": Quantity("m2", "mean square difference of the facing heights"),
+    "structure_function": Quantity("m2", "variance of the difference of the facing heights"),
     "covering_dimension": Quantity("1", "dimension by the area of the triangulated surface"),
     "variogram_dimension": Quantity("1", "dimension by the variogram"),
     "spectrum_dimension": Quantity("1", "dimension by the power spectral density"),

@@ -85,11 +85,11 @@ def decorrelation_length(
     Returns
     -------
     Dataset
-        correlation and structure_function (m2, the variance of the delta-surface) over (direction, shear),
-        NaN beyond the travel of a direction; decorrelation_length (m) over direction, NaN where the faces are
-        still correlated at the greatest shear; decorrelation_length_low and _high, its 95 % interval, NaN
-        where the block is less than 15 lengths wide and holds too few independent parts; missing_reason;
-        run_time (s).
+        correlation and structure_function (m2, the variance of the difference of these heights) over
+        (direction, shear), NaN beyond the travel of a direction; decorrelation_length (m) over direction, NaN
+        where the faces are still correlated at the greatest shear; its 95 % interval
+        decorrelation_length_low and _high, NaN where the block is less than 15 lengths wide and holds too few
+        independent parts; missing_reason; run_time (s).
 
     Raises
     ------

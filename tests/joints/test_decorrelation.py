@@ -99,6 +99,18 @@ def test_correlation_of_mated_faces_starts_at_one(make_face, rough):
     assert result.shear.size == 23
 
 
+def test_structure_function_is_that_of_the_heights_from_both_mean_planes(make_face, rough):
+    heights = rough((48, 48), 3)
+    tilted = make_face(heights + 0.5 * np.arange(48))
+    result = fc.joints.decorrelation_length(
+        fc.joints.Crack(make_face(heights), tilted, block=20, **MATERIAL), direction="E", shear=[0.0, 3.0]
+    )
+    mated = fc.joints.Crack(make_face(heights), block=20, **MATERIAL)
+    variance = fc.joints.delta_surface(mated, [0.0, 3.0], "E").var(("y", "x"))
+    np.testing.assert_allclose(result.structure_function[0], variance, atol=1e-12)
+    assert result.structure_function.attrs["long_name"].startswith("variance of the difference")
+
+
 def test_length_of_a_wave(make_face):
     # correlation cos(kv): 1/e at v = acos(1/e)/k
     x = np.arange(240)
