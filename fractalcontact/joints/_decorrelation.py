@@ -87,7 +87,7 @@ def decorrelation_length(
     Dataset
         correlation and structure_function (m2, the variance of the difference of these heights) over
         (direction, shear), NaN beyond the travel of a direction; decorrelation_length (m) over direction, NaN
-        where the faces are still correlated at the greatest shear; its 95 % interval
+        where the faces are not correlated at no shear, or still are at the greatest; its 95 % interval
         decorrelation_length_low and _high, NaN where the block is less than 15 lengths wide and holds too few
         independent parts; missing_reason; run_time (s).
 
@@ -241,6 +241,8 @@ def estimate_length(
     value = _crossing(correlation, shears)
     if not np.isfinite(correlation[0]):
         return Length(math.nan, missing_reason="the faces are planes")
+    if correlation[0] <= 0:
+        return Length(math.nan, missing_reason="the faces are not correlated at no shear")
     if math.isnan(value):
         return Length(value, missing_reason="the faces are still correlated at the greatest shear")
     if value < shears[1]:

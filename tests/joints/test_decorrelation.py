@@ -99,6 +99,14 @@ def test_correlation_of_mated_faces_starts_at_one(make_face, rough):
     assert result.shear.size == 23
 
 
+def test_faces_that_do_not_match_are_not_called_correlated(make_face, rough):
+    heights = rough((48, 48), 3)
+    crack = fc.joints.Crack(make_face(heights), make_face(-heights), block=20, **MATERIAL)
+    result = fc.joints.decorrelation_length(crack, direction="E")
+    assert result.correlation[0, 0] < -0.99
+    assert result.missing_reason.item() == "the faces are not correlated at no shear"
+
+
 def test_structure_function_is_that_of_the_heights_from_both_mean_planes(make_face, rough):
     heights = rough((48, 48), 3)
     tilted = make_face(heights + 0.5 * np.arange(48))
