@@ -137,7 +137,8 @@ def direct_shear(
         Elastic shear stiffness per area, Pa/m. Default: 2 (1 - nu)/(2 - nu) times the normal stiffness of
         unloading after the first step.
     distance : float, optional
-        Slip (m) over which peak and residual are means. Default: 1 % of the side, at least two cells.
+        Slip (m) over which peak and residual are means, from one cell to the first leg. Default: 1 % of the
+        side, at least two cells.
     keep : any of "residual_lower", "residual_upper"
         Maps to return: heights of the faces after the test, m.
     influence, disc_radius, tolerance
@@ -186,7 +187,8 @@ def direct_shear(
     joints = [WornJoint(problem, towards) for _ in pressures]
     for joint, pressure in zip(joints, pressures, strict=True):
         _test(joint, legs, float(pressure) * area, spring, progress)
-    length = max(PEAK_SHARE * math.sqrt(area), 2 * step) if distance is None else float(distance)
+    # within one step the stress does not change
+    length = max(PEAK_SHARE * math.sqrt(area), 2 * step) if distance is None else max(float(distance), step)
     result = _dataset(crack, joints, legs, pressures, shear_stiffness, min(length, float(np.ptp(legs[0]))))
     for name, index in zip(MAPS, (0, 1), strict=True):
         if name in names:

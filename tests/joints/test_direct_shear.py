@@ -193,6 +193,13 @@ def test_normal_stress_is_met_on_slopes_that_lock(make_face, young, hardness, lo
     assert ("locks" in test.shear_stress.attrs.get("reason", "")) == locks
 
 
+def test_a_distance_below_a_cell_is_one_cell(rough_crack):
+    test = sheared(rough_crack, 4e-4, 1e6, distance=1e-5).isel(nominal_pressure=0)
+    assert test.peak_distance == pytest.approx(1e-4)
+    assert test.peak_shear_strength == pytest.approx(test.shear_stress.values.max(), rel=1e-9)
+    assert test.residual_shear_strength == pytest.approx(test.shear_stress.values[-1], rel=1e-9)
+
+
 def test_spring(rough_crack):
     stiffness = 1e11
     test = sheared(rough_crack, 4e-4, [1e6, 1e7], normal_stiffness=stiffness)
