@@ -154,7 +154,8 @@ def direct_shear(
         normal_stress (Pa), friction_angle, dilatancy_angle (degree) of the step that ends there; dilatancy,
         wear_depth (worn volume over area) (m), worn_fraction, contact_fraction, plastic_work (J). Over
         nominal_pressure: peak_shear_strength, peak_friction_angle, residual_shear_strength (end of the first
-        leg), shear_stiffness; peak_distance.
+        leg; all three NaN with the `reason` where the joint does not reach it), shear_stiffness;
+        peak_distance.
 
     Raises
     ------
@@ -322,16 +323,13 @@ def _peaks(positions: Array, columns: dict[str, Array], length: float) -> dict[s
         work = np.zeros_like(stress)
         work[:, 1:] = np.cumsum(stress[:, 1:] * np.diff(slip), axis=1)
         means.append(secant_slopes(slip, work.T, np.array([length]))[0])  # (point, test)
-    shear, normal = means
-    is_known = np.isfinite(shear)  # not where the window would end beyond the leg, or the joint was crushed
-    peak = np.where(is_known, shear, -np.inf).max(axis=0)
-    ratio = np.where(is_known, shear / normal, -np.inf).max(axis=0)
-    last = is_known.shape[0] - 1 - is_known[::-1].argmax(axis=0)
-    has_mean = is_known.any(axis=0)
+    is_on_leg = np.isfinite(secant_slopes(slip, slip, np.array([length]))[0])
+    # NaN where the test ended on the leg: what the joint would have borne then is not known
+    shear, normal = (mean[is_on_leg] for mean in means)
     return {
-        "peak_shear_strength": np.where(has_mean, peak, np.nan),
-        "peak_friction_angle": np.where(has_mean, np.degrees(np.arctan(ratio)), np.nan),
-        "residual_shear_strength": np.where(has_mean, shear[last, np.arange(last.size)], np.nan),
+        "peak_shear_strength": shear.max(axis=0),
+        "peak_friction_angle": np.degrees(np.arctan((shear / normal).max(axis=0))),
+        "residual_shear_strength": shear[-1],
     }
 
 

@@ -200,6 +200,22 @@ def test_a_distance_below_a_cell_is_one_cell(rough_crack):
     assert test.residual_shear_strength == pytest.approx(test.shear_stress.values[-1], rel=1e-9)
 
 
+def test_a_joint_that_locks_on_its_way_has_no_strength(make_face):
+    """It slides on a flat face for four cells, and meets a wall of slope 3 that it cannot climb."""
+    x = np.arange(60)
+    lower = np.clip(x - 30, 0, 3) * 3e-4
+    upper = np.where(x >= 28, 9e-4, 0.0)
+    faces = (make_face(np.tile(face, (24, 1)), 1e-4, periodic=(True, False)) for face in (lower, upper))
+    crack = fc.joints.Crack(*faces, young=1e22, poisson=0.2, block=(24e-4, 4e-3), basic_friction_angle=35)
+    test = sheared(crack, 9e-4, 1e5, hardness=1e24).isel(nominal_pressure=0)
+    assert np.isfinite(test.shear_stress.values).tolist() == [True] * 5 + [False] * 6
+    for name in ("peak_shear_strength", "peak_friction_angle", "residual_shear_strength"):
+        assert np.isnan(test[name])
+        assert "locks" in test[name].attrs["reason"]
+    before = sheared(crack, 3e-4, 1e5, hardness=1e24)
+    np.testing.assert_allclose(before.peak_friction_angle, 35, rtol=1e-6)
+
+
 def test_spring(rough_crack):
     stiffness = 1e11
     test = sheared(rough_crack, 4e-4, [1e6, 1e7], normal_stiffness=stiffness)
