@@ -10,11 +10,13 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.numbers import ROUNDED, Array
+from fractalcontact.base.resources import require_memory
 from fractalcontact.base.results import public_result
 from fractalcontact.base.rng import RNGLike
 from fractalcontact.base.validation import Problems
 from fractalcontact.surfaces import _from_array
 
+WHERE = "fractalcontact.surfaces.weierstrass"
 AUSLOOS = (
     "Ausloos and Berman, A multivariate Weierstrass-Mandelbrot function, Proceedings of the Royal Society of "
     "London A 400 (1985) 331-350"
@@ -82,7 +84,7 @@ def weierstrass(
     Raises
     ------
     InvalidInput
-        An argument is out of range.
+        An argument is out of range, or the waves do not fit into memory.
 
     Notes
     -----
@@ -103,6 +105,9 @@ def weierstrass(
     extent = max(n * step for n, step in zip(sizes, steps, strict=True))
     wavelengths = 1 + int(math.log(extent / (2.0 * max(steps))) / math.log(float(ratio)) * ROUNDED)
     directions = int(ridges) if len(sizes) == 2 else 1
+    # 4.1 to 4.6 numbers of each wave at a place along an axis: with a ratio near 1 far more than heights
+    waves, places = wavelengths * directions, sum(sizes)
+    require_memory(WHERE, 8.0 * 5.0 * waves * places, f"{waves:g} waves at {places} places along the axes")
     axes = [2.0 * math.pi * step / extent * np.arange(n) for n, step in zip(sizes, steps, strict=True)]
 
     def draw_heights(stream: np.random.Generator) -> tuple[Array, dict[str, Any]]:

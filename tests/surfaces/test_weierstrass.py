@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fractalcontact as fc
-from fractalcontact.base.errors import InvalidInput
+from fractalcontact.base.errors import InvalidInput, TooLittleMemory
 
 
 def weierstrass(shape=(9, 14), spacing=1e-3, *, hurst=0.6, rms_height=1e-6, rng=1, **options):
@@ -52,3 +52,9 @@ def test_variogram_follows_the_exponent():
 def test_invalid_arguments_are_refused(options, problem):
     with pytest.raises(InvalidInput, match=problem):
         weierstrass(**options)
+
+
+@pytest.mark.parametrize("shape", [(9, 14), 20])
+def test_more_waves_than_fit_into_memory_are_refused(shape):
+    with pytest.raises(TooLittleMemory, match=r"waves at 2\d places along the axes: about"):
+        weierstrass(shape, ratio=1 + 1e-12)
