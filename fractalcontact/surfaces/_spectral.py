@@ -75,7 +75,7 @@ def _check_order(problems: Problems, cutoffs: Cutoffs) -> None:
     if given.rolloff is not None:
         expected = f"at most long_cutoff, {longest:g} m"
         problems.require(corner <= longest * ROUNDED, "rolloff", expected, corner)
-    expected = f"at most the roll-off, {corner:g} m"
+    expected = f"at most {corner:g} m, where the density begins to fall"
     problems.require(shortest <= corner * ROUNDED, "short_cutoff", expected, shortest)
 
 

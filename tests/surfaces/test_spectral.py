@@ -250,6 +250,10 @@ def test_all_problems_are_reported_together():
     [
         ({"rolloff": 1e-3, "long_cutoff": 1e-4}, "rolloff"),
         ({"short_cutoff": 1e-5, "rolloff": 5e-6}, "short_cutoff"),
+        (
+            {"short_cutoff": 1.0},
+            "short_cutoff: expected at most .* m, where the density begins to fall, got 1",
+        ),
         ({"shape": (4, 4), "long_cutoff": 2.7e-6, "short_cutoff": 2.1e-6}, "at least one mode"),
         ({"rms_height": 0.0}, "rms_height"),
         ({"hurst": (0.4, 0.8), "anisotropy_ratio": 2.0}, "anisotropy_ratio"),
