@@ -50,7 +50,7 @@ def _check(problems: Problems) -> JointProblem | None:
     if has_load and hardness_is_valid:
         greatest = float(float_array(given.nominal_pressure).max())
         bounded = greatest < float(given.hardness)
-        problems.require(bounded, "nominal_pressure", "less than the hardness", greatest)
+        has_load = problems.require(bounded, "nominal_pressure", "less than the hardness", greatest)
     check_crack(problems)
     hardness = given.hardness if hardness_is_valid else None  # what is wrong has been noted
     load = given.nominal_pressure if has_load else 0.0

@@ -274,8 +274,9 @@ def test_diagonal_path_stays_on_the_grid(rough_crack):
     ],
 )
 def test_wrong_arguments_are_named(rough_crack, change, message):
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=message) as caught:
         sheared(rough_crack, **({"path": 1e-4} | change))
+    assert len(caught.value.problems) == 1
 
 
 def test_missing_heights_are_refused(make_face):
