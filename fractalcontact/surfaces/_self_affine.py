@@ -75,6 +75,11 @@ class SelfAffine:
     ) -> SelfAffine:
         """Return the spectrum with this rms height (m), else this rms slope, else a plateau of 1 m4."""
         unit = cls(hurst, long_cutoff, rolloff, short_cutoff)
+        with Problems("fractalcontact.surfaces.SelfAffine.scaled") as problems:
+            problems.number("rms_height", rms_height, at_least=0, optional=True)
+            problems.number("rms_slope", rms_slope, at_least=0, optional=True)
+            ends = [float(long_cutoff), float(short_cutoff)]
+            problems.require(ends[0] > ends[1], "wavelengths", "long_cutoff > short_cutoff", ends)
         if rms_height is not None:
             plateau = rms_height**2 / unit.moment(0)
         elif rms_slope is not None:

@@ -97,3 +97,16 @@ def test_profile_spectrum_is_the_integral_across(hurst):
 def test_invalid_spectra_are_refused(arguments, problem):
     with pytest.raises(InvalidInput, match=problem):
         SelfAffine.scaled(*arguments, rms_height=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cutoffs", "rms", "problem"),
+    [
+        ((1e-4, 1e-4, 1e-4), {"rms_height": 1e-6}, "long_cutoff > short_cutoff"),
+        ((1e-4, 1e-4, 1e-6), {"rms_height": -1e-6}, "rms_height"),
+        ((1e-4, 1e-4, 1e-6), {"rms_slope": np.nan}, "rms_slope"),
+    ],
+)
+def test_a_spectrum_that_cannot_have_the_rms_is_refused(cutoffs, rms, problem):
+    with pytest.raises(InvalidInput, match=problem):
+        SelfAffine.scaled(0.5, *cutoffs, **rms)
