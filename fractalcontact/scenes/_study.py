@@ -89,14 +89,15 @@ class StudyResults:
     failures : dict of str to str
         Stages that failed, or need one that did, and why.
     preparation : dict
-        What was done to the faces, in words, and how much of the heights is a tilt.
+        What was done to the faces, in words, of an ensemble to those of its first member; and how much of the
+        heights is a tilt, in each member.
     """
 
     groups: dict[str, xr.Dataset]
     seconds: dict[str, float]
     missing: list[str] = field(default_factory=list)
     failures: dict[str, str] = field(default_factory=dict)
-    preparation: dict[str, str | float] = field(default_factory=dict)
+    preparation: dict[str, Any] = field(default_factory=dict)
 
     @property
     def reasons(self) -> list[str]:
@@ -349,7 +350,17 @@ def study_ensemble(
     }
     seconds = total_seconds(done.seconds for done in members.values())
     missing = [f"{count - len(members)} of {count} members"] if len(members) < count else []
-    return StudyResults(groups, seconds, missing)
+    facts = _preparation_of_members({member: done.preparation for member, done in members.items()})
+    return StudyResults(groups, seconds, missing, preparation=facts)
+
+
+def _preparation_of_members(facts: Mapping[int, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return what was done to the faces of the first member, and how much of each member is a tilt."""
+    first, own = next(iter(facts.items()), (0, {}))
+    words = [f"member {first}: {text}" for text in own.get("preparation", "").split("; ") if text]
+    shares = [each["plane_share"] for each in facts.values() if "plane_share" in each]
+    found = {"preparation": "; ".join(words), "plane_share": shares}
+    return {name: fact for name, fact in found.items() if fact}
 
 
 def total_seconds(of_studies: Iterable[Mapping[str, float]]) -> dict[str, float]:

@@ -371,10 +371,13 @@ def aperture_as_placed(tree: xr.DataTree) -> xr.DataArray | None:
 
 def _tilt(tree: xr.DataTree) -> Iterator[str]:
     """Yield that a flat presses a tilted surface at one edge."""
-    share = float(tree.attrs.get("plane_share", 0.0))
-    if share > 0.5 and group_of(tree, "contact") is not None:  # the flat touches one edge
+    shares = np.atleast_1d(tree.attrs.get("plane_share", 0.0))  # of an ensemble one for each member
+    tilted = shares[shares > 0.5]
+    if tilted.size and group_of(tree, "contact") is not None:  # the flat touches one edge
+        where = f" in {tilted.size} of {shares.size} members" if shares.size > 1 else ""
+        carried = " to ".join(dict.fromkeys(f"{100 * end:.0f}" for end in (tilted.min(), tilted.max())))
         yield (
-            f"the surface is tilted: its mean plane carries {100 * share:.0f} % of Sq², so that the flat "
+            f"the surface is tilted{where}: its mean plane carries {carried} % of Sq², so that the flat "
             "touches one edge first, and area and closure are those of a wedge. Remedy: level = 1."
         )
 

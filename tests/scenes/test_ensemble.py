@@ -75,6 +75,35 @@ def test_ensemble_is_written_drawn_and_summarised(ensemble, compliance, tmp_path
     )
 
 
+TILTED = (
+    SOUND.partition("[joint]")[0].replace("rng = 5", "rng = 5\nmembers = 3\n{level}")
+    + """
+[contact]
+nominal_pressure = 1e6
+[want]
+contact = ["press"]
+"""
+)
+
+
+def test_tilt_of_members_is_told_and_what_levelling_did(tmp_path):
+    faces = fc.surfaces.fbm((48, 48), 1e-4, hurst=0.8, rms_increment=4e-6, rng=5, members=3)
+    levelled = fc.surfaces.level(faces, 1)
+    shares = 1 - (levelled.std(["y", "x"]) / faces.std(["y", "x"])).values ** 2
+    trees = {}
+    for level in ("", "level = 1"):
+        (tmp_path / "study.toml").write_text(TILTED.format(level=level), encoding="utf-8")
+        trees[level] = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    np.testing.assert_allclose(trees[""].attrs["plane_share"], shares, rtol=1e-9)
+    percent = 100 * shares[shares > 0.5]
+    text = " ".join(fc.scenes.summary(trees[""]).split())
+    span = " to ".join(dict.fromkeys(f"{end:.0f}" for end in (percent.min(), percent.max())))
+    assert f"tilted in {percent.size} of 3 members: its mean plane carries {span} % of Sq²" in text
+    text = " ".join(fc.scenes.summary(trees["level = 1"]).split())
+    assert "member 0: levelled: tilt" in text
+    assert "tilted" not in text
+
+
 PATH = """
 [surface]
 generate = "fbm"
