@@ -335,7 +335,8 @@ class _ScanTask:
             if not self.folder.parent.is_dir():
                 return NO_ACCESS, {}
             digests = Study(self.scene, PartStore(None)).digests
-            digest = digest_of([digests, self.scene.want.figures])
+            # of all tables: caveats, figures and a datasheet depend on more than the stages do
+            digest = digest_of([digests, self.scene.tables])
             if _is_finished(self.folder, digest):
                 return "", _numbers(netcdf.open(self.folder / RESULT))
             for name in (RESULT, REPORT):

@@ -204,6 +204,18 @@ def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
     )
 
 
+def test_finished_scans_are_repeated_where_what_their_caveats_stand_on_has_changed(tmp_path):
+    scene = write_scans(tmp_path, {"a.nc": (32, 1e-4)})
+    pressed = SCENE.replace("domains = []", 'contact = ["press"]').replace('dimensions = ["incr', '# ["incr')
+    pressed += "[contact]\nnominal_pressure = 1e6\n[material]\nyoung = 6e10\npoisson = 0.2\n"
+    caveats = []
+    for limit in (1e12, 1e6):
+        scene.write_text(f"{pressed}yield_pressure = {limit}\n", encoding="utf-8")
+        result = fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+        caveats.append(str(result["overview/caveats"].item()))
+    assert ["the material yields at" in text for text in caveats] == [False, True]
+
+
 def test_workers_change_no_bit(serial, tmp_path):
     scene, out, result = serial
     same(fc.scenes.run(scene, out=tmp_path, progress=False, workers=2), result)
