@@ -19,7 +19,16 @@ from fractalcontact.base import provenance, schema
 from fractalcontact.base.regression import is_far, random_effects
 from fractalcontact.base.study import MEMBER, NO_REFERENCES, group_of, joined_references, provenance_of
 from fractalcontact.scenes._joint_stages import JRC_COLUMN
-from fractalcontact.scenes._result_tables import SCAN, Column, ResultTable, Rows, cell, column_scale, table_of
+from fractalcontact.scenes._result_tables import (
+    FRACTIONS,
+    SCAN,
+    Column,
+    ResultTable,
+    Rows,
+    cell,
+    column_scale,
+    table_of,
+)
 from fractalcontact.scenes._scene import Scene
 from fractalcontact.scenes._study import StudyResults, stacked, total_seconds
 
@@ -227,10 +236,12 @@ def pooled(main: xr.Dataset) -> xr.Dataset:
         has_errors = key == DIMENSION and ERROR in main and main[ERROR].notnull().any()
         errors = main[ERROR].values if has_errors else 0.0
         found = random_effects(values.values, errors)
-        # D lies between two whole numbers; what is negative in no scan is so in no mean
+        # D lies between two whole numbers, a share of an area is no more than all of it; what is negative in
+        # no scan is so in no mean
         is_dimension, smallest = key == DIMENSION, float(values.min())
         least = float(np.floor(smallest)) if is_dimension else 0.0 if smallest >= 0.0 else -np.inf
-        low, high = np.clip((found.low, found.high), least, least + 1.0 if is_dimension else np.inf)
+        most = least + 1.0 if is_dimension else 1.0 if key in FRACTIONS else np.inf
+        low, high = np.clip((found.low, found.high), least, most)
         text = f"{values.attrs['long_name']}: "
         facts = {
             "": (found.mean, f"mean over {found.count} scans (random effects)"),

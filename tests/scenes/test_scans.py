@@ -14,6 +14,7 @@ from copies import Copy, copied_command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
+from fractalcontact.scenes._result_tree import pooled
 
 SCENE = """title = "Scans"
 [surface]
@@ -187,6 +188,13 @@ def test_mean_has_the_interval_of_student_without_errors(study):
     mean, low, high = (float(result[f"rms_height{end}"]) for end in ("", "_low", "_high"))
     expected = np.maximum(heights.mean() + half * np.array([0, -1, 1]), 0.0)  # no mean height is negative
     np.testing.assert_allclose([mean, low, high], expected, rtol=1e-9)
+
+
+def test_interval_of_a_share_of_the_area_ends_at_all_of_it():
+    shares = xr.DataArray([0.2, 0.9, 0.95], dims="scan", attrs={"units": "1", "long_name": "contact area"})
+    means = pooled(xr.Dataset({"contact_fraction": shares}))
+    assert float(shares.mean() + 4.30265 * shares.std(ddof=1) / 3**0.5) > 1.0  # Student, 2 degrees of freedom
+    assert float(means["contact_fraction_high"]) == 1.0
 
 
 def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
