@@ -229,11 +229,18 @@ def _yes_or_no(value: xr.DataArray) -> str:
 
 
 def interval(low: xr.DataArray, high: xr.DataArray, decimals: int | None) -> str:
-    """Return the ends of an interval, of an ensemble the means of its ends; "none" where there is none."""
-    ends = [end.mean(keep_attrs=True) for end in (low, high)]
-    if not all(np.isfinite(end.values) for end in ends):
+    """Return the ends of an interval, of an ensemble the means over members that have one; else "none"."""
+    is_known = np.isfinite(low) & np.isfinite(high)
+    count = int(is_known.sum())
+    if not count:
         return "none"
-    return " to ".join(cell(end, decimals) for end in ends)
+    ends = [end.where(is_known).mean(keep_attrs=True) for end in (low, high)]
+    return " to ".join(cell(end, decimals) for end in ends) + share_of(count, is_known.size)
+
+
+def share_of(count: int, size: int) -> str:
+    """Return how many members of an ensemble have a value, where some have none."""
+    return f" ({count} of {size})" if count < size else ""
 
 
 def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
@@ -284,7 +291,7 @@ def _over_members(
     known = values[np.isfinite(values)]
     if known.size == 0:
         return "-"
-    share = f" ({known.size} of {values.size})" if known.size < values.size else ""
+    share = share_of(known.size, values.size)
     if values.ndim == 0 or are_one(known):
         return text(float(known[0])) + unit + share
     spread = float(np.std(known, ddof=1))

@@ -160,6 +160,15 @@ def test_members_without_a_value_are_counted(ensemble):
     assert cells["interface closure"] == "-"
 
 
+def test_members_without_an_interval_are_counted(ensemble):
+    holed = ensemble.copy()
+    boxes = holed["domains/box_dimension"].to_dataset().isel(step=-1, shear=-1)
+    boxes["ci_low"] = ("member", [0.5, np.nan, 0.7, 0.8])
+    boxes["ci_high"] = ("member", [1.5, 1.6, 1.7, np.inf])
+    holed["domains/box_dimension"] = xr.DataTree(boxes)
+    assert rows(holed, "box")[0]["95 % interval"] == "0.60 to 1.60 (2 of 4)"  # of both that have both ends
+
+
 @pytest.mark.parametrize("columns", [80, 160])
 def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", str(columns))
