@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.study import group_of
 from fractalcontact.base.units import number
-from fractalcontact.scenes._result_tables import Column, at_value, finite, length, plain
+from fractalcontact.scenes._result_tables import Column, at_value, finite, length, plain, share_of
 from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, stage_type
 
 
@@ -59,10 +59,11 @@ def _middle_box(state: xr.Dataset) -> str | None:
 
 
 def _crosses(state: xr.Dataset) -> str | None:
-    """Return the axes along which the set of contacts crosses the body."""
+    """Return the axes along which the set of contacts crosses the body, and in how many members."""
     if "percolates" not in state or "axis" not in state.coords:
         return None
-    axes = [str(axis) for axis in state["axis"].values if bool(state["percolates"].sel(axis=axis).all())]
+    along = {str(axis): state["percolates"].sel(axis=axis) for axis in state["axis"].values}
+    axes = [f"{axis}{share_of(int(each.sum()), each.size)}" for axis, each in along.items() if each.any()]
     return f"along {' and '.join(axes)}" if axes else "no"
 
 

@@ -169,6 +169,15 @@ def test_members_without_an_interval_are_counted(ensemble):
     assert rows(holed, "box")[0]["95 % interval"] == "0.60 to 1.60 (2 of 4)"  # of both that have both ends
 
 
+def test_members_whose_contacts_cross_are_counted(ensemble):
+    tree = ensemble.copy()
+    crosses = [[True, True], [True, False], [True, False], [True, True]]
+    percolation = xr.Dataset({"percolates": (("member", "axis"), crosses)}, {"axis": ["x", "y"]})
+    for axes, words in ((["x", "y"], "along x and y (2 of 4)"), (["y"], "along y (2 of 4)")):
+        tree["domains/percolation"] = xr.DataTree(percolation.sel(axis=axes))
+        assert f"contacts cross {words}" in remarks(tree)
+
+
 @pytest.mark.parametrize("columns", [80, 160])
 def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", str(columns))
