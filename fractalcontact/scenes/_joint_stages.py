@@ -45,11 +45,11 @@ def _extreme(choose: Any, fewest: int) -> Any:
 
     def describe(data: xr.Dataset) -> str | None:
         metric = data["roughness_metric"]
-        metric = metric.mean(MEMBER) if MEMBER in metric.dims else metric
-        if metric.count() < fewest:
+        mean = metric.mean(MEMBER) if MEMBER in metric.dims else metric
+        if mean.count() < fewest:
             return None
-        at = metric.isel(azimuth=int(choose(metric.values)))
-        return f"{float(at):.2f}° toward {float(at['azimuth']):g}°"
+        at = metric.isel(azimuth=int(choose(mean.values)))
+        return f"{plain(at, 2)}° toward {float(at['azimuth']):g}°"
 
     return describe
 

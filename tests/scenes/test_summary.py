@@ -178,6 +178,17 @@ def test_members_whose_contacts_cross_are_counted(ensemble):
         assert f"contacts cross {words}" in remarks(tree)
 
 
+def test_directional_roughness_of_members_has_its_deviation():
+    faces = fc.surfaces.fbm((32, 32), 2e-4, hurst=0.7, rms_increment=3e-5, rng=3, members=3)
+    of_each = [fc.joints.directional_roughness(faces.isel(member=number)) for number in range(3)]
+    rose = xr.concat(of_each, xr.Variable("member", range(3)), combine_attrs="override")
+    metric = rose.roughness_metric
+    greatest = metric.isel(azimuth=int(metric.mean("member").argmax("azimuth")))
+    expected = f"{float(greatest.mean()):.2f} ± {float(greatest.std(ddof=1)):.2f}°"
+    text = remarks(xr.DataTree.from_dict({"/joints/directional_roughness": rose}))
+    assert f"largest roughness metric {expected} toward {float(greatest.azimuth):g}°" in text
+
+
 @pytest.mark.parametrize("columns", [80, 160])
 def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", str(columns))
