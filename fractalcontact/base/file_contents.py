@@ -128,13 +128,13 @@ def stage_rows(result: Any) -> list[tuple[str, ...]]:
     return rows
 
 
-def remarks(methods: Sequence[str], texts: Any) -> dict[str, str]:
-    """Return texts (..., methods) by method; a text of several methods is listed once, without empty ones."""
+def remarks(methods: Sequence[str], texts: Any) -> list[tuple[str, str]]:
+    """Return each of the texts (..., methods) once behind the methods that have it, without empty ones."""
     methods_of: dict[str, dict[str, None]] = {}
     for row in np.reshape(np.asarray(texts, dtype=str), (-1, len(methods))):
         for method, text in zip(methods, row, strict=True):
             methods_of.setdefault(text, {})[method] = None
-    return {", ".join(names): text for text, names in methods_of.items() if text}
+    return [(", ".join(names), text) for text, names in methods_of.items() if text]
 
 
 def _are_stages(stages: Any) -> bool:
@@ -216,5 +216,5 @@ def _reason_lines(group: Header) -> Iterable[str]:
     """Yield the remarks on single methods."""
     order = [str(name) for name in group.values.get("method", ())]
     for key in REMARKS if order else ():
-        for concerned, remark in remarks(order, group.values.get(key, [])).items():
+        for concerned, remark in remarks(order, group.values.get(key, [])):
             yield note(f"{concerned}: {remark}", indent=4)

@@ -17,7 +17,7 @@ from fractalcontact.base.study import group_of, member_count, of_member, scene_o
 from fractalcontact.base.tables import note, table
 from fractalcontact.base.units import number, quantity_text, without_rounding
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.scenes._result_tables import ResultTable, length, table_of
+from fractalcontact.scenes._result_tables import ResultTable, length, share_of, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
 from fractalcontact.scenes._stages import STAGES
 
@@ -350,9 +350,9 @@ def _no_interval(tree: xr.DataTree) -> Iterator[str]:
     estimates = group_of(tree, "dimensions")
     if estimates is None or "default" not in estimates["method"].values:
         return
-    reasons = estimates["reason"].sel({"method": "default"}).values
-    for reason in dict.fromkeys(str(text) for text in np.atleast_1d(reasons) if text):
-        yield f"D has no interval: {reason}."
+    reasons = [str(text) for text in np.ravel(estimates["reason"].sel({"method": "default"}).values)]
+    for reason in dict.fromkeys(filter(None, reasons)):
+        yield f"D has no interval{share_of(reasons.count(reason), len(reasons))}: {reason}."
 
 
 def _spikes(tree: xr.DataTree) -> Iterator[str]:

@@ -11,7 +11,7 @@ import xarray as xr
 from fractalcontact.base.file_contents import remarks
 from fractalcontact.base.study import MEMBER, group_of, provenance_of
 from fractalcontact.base.units import quantity_text
-from fractalcontact.scenes._result_tables import Column, Rows, length, plain
+from fractalcontact.scenes._result_tables import Column, Rows, length, plain, share_of
 from fractalcontact.scenes._scene import PRESS
 from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType, stage_type
 
@@ -20,8 +20,10 @@ def _of_method(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield notes and reasons, those of several methods once."""
     methods = [str(name) for name in data["method"].values]
     for key in (key for key in ("note", "reason") if key in data):
-        texts = data[key].transpose(..., "method").values
-        yield from (f"{names}: {text}" for names, text in remarks(methods, texts).items())
+        texts = data[key].transpose(..., "method").values.reshape(-1, len(methods))
+        for names, text in remarks(methods, texts):
+            count = int((texts == text).any(axis=1).sum())
+            yield f"{names}{share_of(count, len(texts))}: {text}"
     if MEMBER in data.dims:
         yield "The intervals are those of one surface: the means of their ends."
 

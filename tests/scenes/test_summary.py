@@ -189,6 +189,18 @@ def test_directional_roughness_of_members_has_its_deviation():
     assert f"largest roughness metric {expected} toward {float(greatest.azimuth):g}°" in text
 
 
+def test_members_are_counted_whose_dimension_has_a_note_or_no_interval(ensemble):
+    tree = ensemble.copy()
+    estimates = tree["dimensions"].to_dataset().isel(method=[0]).assign_coords(method=["default"])
+    estimates["reason"] = (("member", "method"), [["too few"], [""], ["too few"], ["seams"]])
+    estimates["note"] = (("member", "method"), [["smooth"]] * 4)
+    tree["dimensions"] = xr.DataTree(estimates)
+    text = remarks(tree)
+    for words in ("default (2 of 4): too few", "default (1 of 4): seams", "default: smooth"):
+        assert words in text
+    assert "D has no interval (2 of 4): too few. D has no interval (1 of 4): seams." in text
+
+
 @pytest.mark.parametrize("columns", [80, 160])
 def test_summary_plan_and_contents_fit_the_screen(ensemble, columns, monkeypatch, tmp_path):
     monkeypatch.setenv("COLUMNS", str(columns))
