@@ -298,7 +298,9 @@ def datasheet(tree: xr.DataTree, *, figure: Any = None) -> dict[str, Any]:
             is_of_joint = any(group_of(tree, f"joints/{name}") is not None for name in GROUPS)
             problems.require(is_of_joint, "tree", f"at least one of joints/{', joints/'.join(GROUPS)}", NONE)
 
-    study = of_member(tree, 0)
+    study, members = of_member(tree, 0), member_count(tree)
+    if members:
+        study.attrs["title"] = f"{tree.attrs.get('title') or tree.name or 'joint'}: member 0 of {members}"
     pairs = ((columns, made) for name, columns in SHOWN.items() for made in stage_tables(study, [name]))
     shown = [made.selected(columns).shortened(4) for columns, made in pairs]
     # the page has room for so many rows, and for so many characters beside the strength

@@ -62,6 +62,16 @@ def test_words_are_those_of_the_results(tree):
         assert expected in shown, expected
 
 
+def test_page_of_an_ensemble_names_the_member_whose_numbers_it_has(tree):
+    twice = xr.DataTree.from_dict(
+        {node.path: node.to_dataset().expand_dims(member=2) for node in tree.leaves}
+    )
+    twice.attrs = dict(tree.attrs)
+    shown = texts(figure_of(fc.scenes.datasheet(twice)))
+    assert "Joint under the spillway: member 0 of 2" in shown
+    assert "member" not in texts(figure_of(fc.scenes.datasheet(tree)))
+
+
 def test_numbers_are_those_of_the_tables(tree):
     shown = texts(figure_of(fc.scenes.datasheet(tree)))
     coefficient = tree["joints/roughness_coefficient"].roughness_coefficient.values[0]
