@@ -27,9 +27,11 @@ def _outside_scale(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
 
 
 def _jrc(state: xr.Dataset) -> Any:
-    """Return the roughness coefficient; words for one below the scale."""
+    """Return the roughness coefficient, of members those on the scale; words for one below it."""
     value = state.get("roughness_coefficient")
-    return jrc_text(float(value)) if value is not None and value.ndim == 0 and value < 0 else value
+    if value is None or not (value < 0).any():
+        return value
+    return value.where(value >= 0) if (value >= 0).any() else jrc_text(float(value.max()))
 
 
 def _jrc_scatter(state: xr.Dataset) -> str:

@@ -170,8 +170,8 @@ _ROWS = Rows(
 def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
     """Return the numbers that stand for a study: dimensions of the first method, else the largest values.
 
-    Of an ensemble they are means over the members, of many scans values along `scan`. Their names say over
-    which dims they are the largest, and of which group.
+    Of an ensemble they are means over the members, without JRC below its scale, of many scans values along
+    `scan`. Their names say over which dims they are the largest, and of which group.
     """
     main: dict[str, xr.DataArray] = {}
     for entry in MAIN:
@@ -181,9 +181,11 @@ def main_results(results: Mapping[str, xr.Dataset]) -> xr.Dataset:
                 values = result[name].isel(method=0, drop=True) if "method" in result.dims else result[name]
                 others = [str(dim) for dim in values.dims if dim not in (MEMBER, SCAN)]
                 number = values.max(others) if others else values
-                number = number.mean(MEMBER) if MEMBER in number.dims else number
                 largest = f": the largest over {', '.join(others)}" if others else ""
                 words = f"{values.attrs.get('long_name', name)}{largest}, of the group {group}"
+                if MEMBER in number.dims:
+                    number = on_scale(name, number).mean(MEMBER)
+                    words += ", mean over the members"
                 main[name] = number.reset_coords(drop=True).assign_attrs(values.attrs, long_name=words)
     return xr.Dataset(main)
 
@@ -222,17 +224,18 @@ def pictured(tree: xr.DataTree) -> xr.DataTree:
     return xr.DataTree.from_dict({"/": xr.Dataset(attrs=tree.attrs), OVERVIEW: tree[OVERVIEW]})
 
 
-def pooled(main: xr.Dataset) -> xr.Dataset:
-    """Return the mean of every main result over the scans, its interval, and the scatter between scans.
+def on_scale(name: str, values: xr.DataArray) -> xr.DataArray:
+    """Return values without JRC below its scale: it is extrapolated, to -40 on a smooth face."""
+    return values.where(values >= 0) if name == JRC else values
 
-    JRC below its scale is extrapolated, to -40 on a smooth face: it is left out.
-    """
+
+def pooled(main: xr.Dataset) -> xr.Dataset:
+    """Return the mean of every main result over the scans, its interval, and the scatter between scans."""
     means: dict[str, tuple[tuple[()], float, dict[str, str]]] = {}
     for key, values in main.data_vars.items():
         if str(key).endswith(("_low", "_high")) or key == ERROR:
             continue
-        if key == JRC:
-            values = values.where(values >= 0)
+        values = on_scale(str(key), values)
         has_errors = key == DIMENSION and ERROR in main and main[ERROR].notnull().any()
         errors = main[ERROR].values if has_errors else 0.0
         found = random_effects(values.values, errors)

@@ -12,6 +12,7 @@ from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.file_contents import file_contents
 from fractalcontact.base.units import quantity_text, scale_for
 from fractalcontact.scenes._result_tables import amount
+from fractalcontact.scenes._result_tree import main_results
 
 ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 4").replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -199,6 +200,21 @@ def test_members_are_counted_whose_dimension_has_a_note_or_no_interval(ensemble)
     for words in ("default (2 of 4): too few", "default (1 of 4): seams", "default: smooth"):
         assert words in text
     assert "D has no interval (2 of 4): too few. D has no interval (1 of 4): seams." in text
+
+
+@pytest.mark.parametrize(
+    ("values", "cell"), [([4.0, -40.0, 6.0], "5.0 ± 1.4 (2 of 3)"), ([-40.0, -1.0, -2.0], "below 0")]
+)
+def test_jrc_of_members_below_the_scale_is_not_in_the_mean(values, cell):
+    face = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
+    jrc = fc.joints.roughness_coefficient(face, direction=["E"]).expand_dims(member=3).copy(deep=True)
+    jrc["roughness_coefficient"].values[:, 0] = values
+    tree = xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc})
+    (row,) = rows(tree, "joint roughness coefficient (JRC)")
+    assert row["JRC"] == cell
+    mean = main_results({"joints/roughness_coefficient": jrc})["roughness_coefficient"]
+    assert "mean over the members" in mean.attrs["long_name"]
+    assert float(mean) == 5.0 if "of 3" in cell else np.isnan(mean)
 
 
 @pytest.mark.parametrize("columns", [80, 160])
