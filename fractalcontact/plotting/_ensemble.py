@@ -39,7 +39,8 @@ def _quantile(dataset: xr.Dataset, share: float) -> xr.Dataset:
     loads = [name for name, coord in dataset.coords.items() if MEMBER in coord.dims and name != MEMBER]
     flat = dataset.reset_coords(loads)
     curves = [name for name, variable in flat.data_vars.items() if _is_curve(variable)]
-    with warnings.catch_warnings():
+    # beside ends without a bound, which are infinite, there is no quantile
+    with warnings.catch_warnings(), np.errstate(invalid="ignore"):
         warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)
         reduced = {name: flat[name].quantile(share, MEMBER, keep_attrs=True) for name in curves}
     first = flat.isel({MEMBER: 0}, drop=True).assign(reduced)

@@ -8,6 +8,7 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import fractalcontact as fc
+from fractalcontact.plotting._ensemble import reduced_trees
 
 FORCES = np.array([1.0, 2.0, 4.0])
 FACTORS = np.array([0.01, 0.02, 0.03, 0.05, 0.09])
@@ -127,3 +128,13 @@ def test_band_from_no_load_on_draws_without_warning(drawn, recwarn):
     pressed = fc.contact.press(faces, contact_modulus=1e10, nominal_pressure=[0.0, 1.0, 1e7], keep="state")
     assert "contact_area" in drawn(xr.DataTree.from_dict({"contact": pressed}))
     assert [str(warning.message) for warning in recwarn if "non-positive" in str(warning.message)] == []
+
+
+def test_ends_without_a_bound_give_no_warning():
+    ends = xr.Dataset({"greatest_closure_high": ("member", [1.0, 2.0, 3.0, np.inf, np.inf])})
+    _, low, high = (
+        float(tree["joints/closure_laws/greatest_closure_high"])
+        for tree in reduced_trees(xr.DataTree.from_dict({"joints/closure_laws": ends}))
+    )
+    assert low == pytest.approx(1.64)
+    assert not np.isfinite(high)
