@@ -13,8 +13,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import secrets
 import shutil
+import unicodedata
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -41,6 +43,10 @@ if TYPE_CHECKING:
 
 REPORT, DATASHEET, TABLES, CSV = "report.html", "datasheet.pdf", "tables", "scans.csv"
 SCANS = "scans"  # folder and group of the single scans
+# not in the name of a NetCDF group: "/", controls, spaces at the end; a first character other than `FIRST`
+ESCAPED = re.compile(r"[%/\x00-\x1f\x7f]| +\Z")
+ESCAPED_ACCENTS = re.compile(rf"{ESCAPED.pattern}|[^\x00-\x7f]")
+FIRST = re.compile(r"[A-Za-z0-9]|[^\x00-\x7f]")
 GENERATOR = 'name="generator" content="fractalcontact'  # of a report, in its head
 SOFTWARE = "fractalcontact"  # of a figure, as its metadata say
 REMEDY = "choose another folder, or --force to overwrite"
@@ -75,8 +81,14 @@ def results_folder(out: str | os.PathLike[str] | None, scene: Scene, *, force: b
 
 
 def folder_of(name: str) -> str:
-    """Return the name of the folder and the group of a scan; those of two scans differ."""
-    return name.replace("%", "%25").replace("/", "%2F")
+    """Return the name of the folder and the group of a scan; those of two scans differ.
+
+    What the name of a NetCDF group may not have is percent-encoded, and accents that NetCDF would compose; it
+    begins with a further underscore where it does not begin with a letter or a digit.
+    """
+    pattern = ESCAPED if unicodedata.is_normalized("NFC", name) else ESCAPED_ACCENTS
+    escaped = pattern.sub(lambda found: "".join(f"%{byte:02X}" for byte in found[0].encode()), name)
+    return escaped if FIRST.match(escaped) else f"_{escaped}"
 
 
 def page_of(name: str) -> str:

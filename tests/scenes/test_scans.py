@@ -173,6 +173,19 @@ def test_scans_whose_names_differ_by_a_slash_have_their_own_folders(tmp_path):
         assert f'href="scans/{quote(page.parent.name)}/report.html"' in text
 
 
+def test_scans_have_any_names_that_files_have(tmp_path):
+    accents = ["\N{LATIN SMALL LETTER U WITH DIAERESIS}.nc", "u\N{COMBINING DIAERESIS}.nc"]
+    names = ["%25.nc", "-1.nc", "(a) #1?.nc", "_%25.nc", "_-1.nc", "a\n.nc", *accents]
+    scene = write_scans(tmp_path, dict.fromkeys(names, (16, 1e-4)))
+    scene.write_text(SCENE.partition("dimensions")[0], encoding="utf-8")
+    result = fc.scenes.run(scene, out=tmp_path / "out", progress=False)
+    assert set(result["overview/scan"].values) == set(names)
+    groups = fc.open(tmp_path / "out" / "result.nc")["scans"].children
+    assert set(groups) == {path.name for path in (tmp_path / "out" / "scans").iterdir()}
+    heights = {groups[group]["surfaces/height"].values.tobytes() for group in groups}
+    assert len(heights) == len(groups) == len(names)
+
+
 def test_a_file_named_twice_is_refused(tmp_path):
     scene = write_scans(tmp_path, {"a.nc": (32, 1e-4)})
     scene.write_text(SCENE.replace('"scans/*.nc"', '["scans/a.nc", "./scans/a.nc"]'), encoding="utf-8")
