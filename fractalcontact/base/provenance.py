@@ -220,12 +220,12 @@ def member_entry(entry: Any, member: int) -> Any:
     return {key: member_entry(value, member) for key, value in entry.items()}
 
 
-def member_count(entry: Any) -> int | None:
-    """Return the number of members of the ensemble that a provenance describes; None for a single result."""
+def member_count(entry: Any, dim: str = MEMBER) -> int | None:
+    """Return the number of members, or scans, that a provenance describes; None for a single result."""
     items = entry if isinstance(entry, list) else list(entry.values()) if isinstance(entry, dict) else []
-    if isinstance(entry, dict) and set(entry) == {MEMBER} and isinstance(entry[MEMBER], list):
-        return len(entry[MEMBER])
-    return next((count for item in items if (count := member_count(item)) is not None), None)
+    if isinstance(entry, dict) and set(entry) == {dim} and isinstance(entry[dim], list):
+        return len(entry[dim])
+    return next((count for item in items if (count := member_count(item, dim)) is not None), None)
 
 
 def _read(provenance: Any) -> Any:

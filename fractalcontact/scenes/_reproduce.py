@@ -15,8 +15,9 @@ from fractalcontact.base import provenance
 from fractalcontact.base.errors import FractalContactWarning, InvalidInput, warn
 from fractalcontact.base.files import datasets_folder
 from fractalcontact.base.study import provenance_of
-from fractalcontact.base.validation import Problems
+from fractalcontact.base.validation import Problems, Words
 from fractalcontact.scenes._parts import call, concatenate
+from fractalcontact.scenes._result_tables import SCAN
 from fractalcontact.scenes._stage_type import public_function
 
 WHERE = "fractalcontact.scenes.reproduce"
@@ -73,6 +74,8 @@ def reproduce(
             entry = provenance_of(result)
             count = provenance.member_count(entry)
             problems.integer("member", member, at_least=0, at_most=(count or 1) - 1, optional=count is None)
+            scans, expected = provenance.member_count(entry, SCAN), "that of one scan, from its own result"
+            problems.require(scans is None, "result", expected, Words(f"that of {scans} scans"))
     source = _Source(Path(folder))
     if count is not None and member is not None:
         entry = provenance.member_entry(entry, member)

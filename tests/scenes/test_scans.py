@@ -111,6 +111,15 @@ def test_report_of_the_file_has_the_overview_and_links(study):
     assert "data:image/png" in page
 
 
+def test_result_of_one_scan_is_reproduced_and_that_of_all_refused(study):
+    scene, out, result = study
+    of_one = fc.open(out / "scans" / "b.nc" / "result.nc")["dimensions"]
+    again = fc.scenes.reproduce(of_one, folder=scene.parent / "scans")
+    np.testing.assert_array_equal(again["hurst"], of_one["hurst"])
+    with pytest.raises(InvalidInput, match="result: expected that of one scan, .* got that of 5 scans"):
+        fc.scenes.reproduce(result["dimensions"], folder=scene.parent / "scans")
+
+
 def test_stage_that_fails_leaves_the_other_results_of_its_scan(tmp_path):
     scene = write_scans(tmp_path, {"a.nc": (32, 1e-4), "gap.nc": (32, 1e-4)})
     file = tmp_path / "scans" / "gap.nc"
