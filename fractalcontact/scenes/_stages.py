@@ -263,18 +263,37 @@ PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
 
 
 def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None = None) -> dict[str, float]:
-    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read."""
+    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read.
+
+    The stored maps of all members of an ensemble stay until they are joined, each group in turn.
+    """
+    peaks, stored = _member_memory(scene, stages, face)
+    others, joined = int(scene.surface.members or 1) - 1, 0.0
+    kept = sum(stored.values())
+    for name in peaks if others else ():
+        own = (others + 1) * stored.get(name, 0.0)
+        joined += own
+        at_end = _libraries({stage.row.subpackage for stage in stages}) + (others + 1) * kept + joined
+        peaks[name] = max(peaks[name] + others * kept, at_end if own else 0.0)
+    return peaks
+
+
+def _member_memory(
+    scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the peak memory of each stage for one surface, and the bytes of the maps that the result has."""
     generator = scene.surface.generate
     if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
-        return {}
+        return {}, {}
     try:
         shape, spacing = _inputs.surface_grid(scene, face)
     except InvalidInput:
-        return {}
+        return {}, {}
     surface, block = Plane(shape, generator in PERIODIC), Plane(_inputs.block_shape(scene, shape, spacing))
     held = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
     loaded: set[str] = set()
-    peaks = {}
+    peaks: dict[str, float] = {}
+    stored: dict[str, float] = {}
     for stage in stages:
         loaded.add(stage.row.subpackage)
         libraries = _libraries(loaded)
@@ -283,6 +302,7 @@ def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | Non
             continue
         if stage.name == "surfaces":
             peaks[stage.name] = libraries + max(held, _surface_memory(scene, surface))
+            stored[stage.name] = 8.0 * surface.cells if stage.stored else 0.0
             continue
         takes = stage.row.takes
         plane = surface if takes == "surface" or (takes == "map" and scene.is_pressed) else block
@@ -293,10 +313,12 @@ def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | Non
         call = _with_steps(options, section)
         estimate = public_function(stage.row.function).memory  # type: ignore[attr-defined]
         working = bytes_on(estimate, Plane(plane.shape, plane.periodic, planes), call)
-        maps = sum(map(map_bytes, stage.keep)) * plane.cells * steps * shears
+        states = plane.cells * steps * shears
+        maps = sum(map(map_bytes, stage.keep)) * states
         peaks[stage.name] = libraries + held + max(working, 2.0 * maps)
         held += maps
-    return peaks
+        stored[stage.name] = maps - sum(map(map_bytes, stage.internal)) * states
+    return peaks, stored
 
 
 def check_memory(
@@ -308,7 +330,8 @@ def check_memory(
         return
     name = max(peaks, key=lambda stage: peaks[stage])
     processes = max(1, workers)
-    needed = peaks[name] * processes - STARTED  # that this process has taken
+    one = _member_memory(scene, stages, face)[0][name]  # this process alone has the maps of other members
+    needed = peaks[name] + one * (processes - 1) - STARTED  # that this process has taken
     shared = f" in {processes} processes" if processes > 1 else ""
     require_memory("fractalcontact.scenes.run", needed, f"the stage {name}{shared}")
 

@@ -121,6 +121,20 @@ domains = ["box_counts"]
 """
 
 
+def test_plan_has_the_maps_of_all_members(tmp_path):
+    """They stay until they are joined: 8 and 24 members of 256 x 256 points took 506 and 930 MB."""
+    text = PATH.replace("[32, 32]", "[256, 256]").replace("count = 60", "count = 12")
+    text = text.replace('domains = ["box_counts"]', 'keep = ["state", "pressure", "gap"]')
+    peaks = []
+    for members in (8, 24):
+        scene = tmp_path / "study.toml"
+        scene.write_text(text.replace("rng = 5", f"rng = 5\nmembers = {members}"), encoding="utf-8")
+        peaks.append(fc.scenes.plan(fc.scenes.load(scene)).memory["contact"])
+    maps = 12 * 256 * 256 * (1 + 8 + 8)  # bytes of a state, a pressure and a gap
+    assert peaks[1] - peaks[0] == 2 * 16 * maps  # those of the members, and joined
+    np.testing.assert_allclose(peaks, [506e6, 930e6], rtol=0.15)
+
+
 class Recorder(Executor):
     """Runs every task at once and keeps the datasets of its result."""
 
