@@ -241,7 +241,9 @@ def pooled(main: xr.Dataset) -> xr.Dataset:
         found = random_effects(values.values, errors)
         # D lies between two whole numbers, a share of an area is no more than all of it; what is negative in
         # no scan is so in no mean
-        is_dimension, smallest = key == DIMENSION, float(values.min())
+        is_dimension = key == DIMENSION
+        ends = main.get(ENDS[0], values) if is_dimension else values  # D of white noise is a whole number
+        smallest = float(np.fmin(values.min(), ends.min()))
         least = float(np.floor(smallest)) if is_dimension else 0.0 if smallest >= 0.0 else -np.inf
         most = least + 1.0 if is_dimension else 1.0 if key in FRACTIONS else np.inf
         low, high = np.clip((found.low, found.high), least, most)

@@ -219,6 +219,16 @@ def test_interval_of_a_share_of_the_area_ends_at_all_of_it():
     assert float(means["contact_fraction_high"]) == 1.0
 
 
+def test_interval_of_the_dimension_of_white_noise_ends_at_three():
+    texts = {"units": "1", "long_name": "fractal dimension"}
+    columns = {"": [3.0, 3.0, 3.0], "_low": [2.99, 2.98, 2.98], "_high": [3.0, 3.0, 3.0]}
+    main = {f"fractal_dimension{end}": ("scan", each, texts) for end, each in columns.items()}
+    means = pooled(xr.Dataset(main | {"standard_error": ("scan", [0.015] * 3, {"units": "1"})}))
+    low, high = (float(means[f"fractal_dimension_{end}"]) for end in ("low", "high"))
+    assert low == pytest.approx(3.0 - 4.30265 * 0.015 / 3**0.5, abs=1e-5)  # Student, 2 degrees of freedom
+    assert high == 3.0
+
+
 def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
     scene, out, result = study
     surface = fc.surfaces.fbm((32, 32), 1e-4, hurst=0.7, rms_increment=1e-5, rng=9)
