@@ -302,7 +302,10 @@ def scan_facts(tree: xr.DataTree) -> Iterator[str]:
     if JRC in overview and (overview[JRC] < 0).any():
         chosen = names[overview[JRC].values < 0]
         yield f"JRC is below 0, beyond its scale, and left out of the mean: {_few(chosen)}"
-    found = {each.column.head: is_far(overview[each.name].values) for each in MAIN if each.name in overview}
+    columns = {
+        each.column.head: on_scale(each.name, overview[each.name]) for each in MAIN if each.name in overview
+    }
+    found = {head: is_far(values.values) for head, values in columns.items()}
     texts = [f"{head} of {_few(names[is_one])}" for head, is_one in found.items() if is_one.any()]
     if texts:
         yield f"outliers: {'; '.join(texts)}"

@@ -14,7 +14,7 @@ from copies import Copy, copied_command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
-from fractalcontact.scenes._result_tree import pooled
+from fractalcontact.scenes._result_tree import pooled, scan_facts
 
 SCENE = """title = "Scans"
 [surface]
@@ -371,6 +371,17 @@ def test_jrc_below_its_scale_is_in_words_and_in_no_mean(tmp_path):
     text = fc.scenes.summary(result)
     assert "left out of the mean: 0.nc" in text
     assert "below 0" in next(line for line in text.splitlines() if line.startswith("0.nc"))
+
+
+def test_jrc_below_its_scale_is_no_outlier_of_those_on_it():
+    values = [-40.0, 3.0, 3.1, 3.2, 2.9, 9.0]
+    columns = {"roughness_coefficient": values, "status": ["done"] * 6, "caveats": [""] * 6}
+    overview = xr.Dataset({name: ("scan", each) for name, each in columns.items()}, {"scan": list("abcdef")})
+    facts = list(scan_facts(xr.DataTree.from_dict({"overview": overview})))
+    assert facts[1:] == [
+        "JRC is below 0, beyond its scale, and left out of the mean: a",
+        "outliers: JRC of f",
+    ]
 
 
 def test_many_rows_are_cut_with_a_word(study):
