@@ -105,22 +105,23 @@ def _masks_of(data: xr.Dataset) -> tuple[Family, list[Any]]:
     names = [dim for dim in SEVERAL if f"island_{dim}" in data.coords]
     if not names:
         return ordered((), count=1), [slice(None)]
-    columns = [_places(data, dim) for dim in names]
-    masks, group = np.unique(np.stack(columns, -1), axis=0, return_inverse=True)
-    groups = [np.flatnonzero(group.ravel() == number) for number in range(len(masks))]
+    columns = np.stack([_places(data, dim) for dim in names], -1)
+    there = np.flatnonzero((columns >= 0).all(axis=1))
+    masks, group = np.unique(columns[there], axis=0, return_inverse=True)
+    groups = [there[group.ravel() == number] for number in range(len(masks))]
     if len(names) == 1 and names[0] in ("shear", "step"):
         every = (_paths.by_shear if names[0] == "shear" else _paths.by_load)(data)
-        return ordered([every.labels[place] for (place,) in masks], every.name, every.unit), groups
+        labels = [every.labels[place] for (place,) in masks] if every.labels else ()
+        return ordered(labels, every.name, every.unit, len(masks)), groups
     places = [dict(zip(names, map(int, mask), strict=True)) for mask in masks]
     return ordered([", ".join(_state_texts(data, place)) for place in places]), groups
 
 
 def _places(data: xr.Dataset, dim: str) -> Array:
-    """Return for each island its place along a dim of the masks."""
-    values = data[f"island_{dim}"].values
-    if dim not in data.coords:
-        return values.astype(np.int64)
-    return np.array([np.flatnonzero(data[dim].values == value)[0] for value in values], np.int64)
+    """Return for each island its place along a dim of the masks, -1 where its mask was not chosen."""
+    known = data[dim].values if dim in data.coords else np.arange(data.sizes[dim])
+    is_known = data[f"island_{dim}"].values[:, None] == known
+    return np.where(is_known.any(axis=1), is_known.argmax(axis=1), -1)
 
 
 @figure
@@ -221,7 +222,8 @@ def alluvial(
     ax.set(xlabel=scale.label(name_of(path[name])) if name else "step", ylabel="cells in contact")
     distance = max(1, -(-len(stacks) // _style.MAX_LEGEND_ENTRIES))
     shown = slice((len(stacks) - 1) % distance, None, distance)  # the last one always
-    ax.set_xticks(range(len(stacks))[shown], texts[shown])
+    places = range(len(stacks))[shown]  # none without a state before it
+    ax.set_xticks(places, [texts[place] for place in places])
     ax.set_title(_paths.shear_text(path, data))
     ax.autoscale_view()
     ax.set_ylim(bottom=0)

@@ -111,9 +111,9 @@ def shear_curve(
         for each, own, style in zip(data, of_each, ({}, _style.DASHED), strict=False):
             title = str(each.attrs.get("title", name))
             for i, place in enumerate(own):
-                along = each["shear_displacement"].broadcast_like(each[name]).values[i]
-                curve = family.curve(title, place)
-                panel.line(curve, along, each[name].values[i], **(family.styles[place] | style))
+                along = each["shear_displacement"].broadcast_like(each[name])
+                points = (np.atleast_1d(values[i]) for values in (along.values, each[name].values))
+                panel.line(family.curve(title, place), *points, **(family.styles[place] | style))
             if beside is not None:
                 panel.key(str(each.attrs.get("title", "")), **style)
         panel.finish(legend=name == SHOWN[-1])
