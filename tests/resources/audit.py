@@ -91,6 +91,8 @@ KERNELS = {
     "islands": ("domains", 3),
     "quarters": ("domains", 2),
 }
+# of modes in double precision, and in single precision for the preconditioner of a periodic body
+IN_TWO_PRECISIONS = ("contact._kernels.scale_modes",)
 OF_MASKS = tuple(name for name, (subpackage, _) in KERNELS.items() if subpackage == "domains")
 
 
@@ -129,7 +131,8 @@ REQUIREMENTS = {
     "dimensions/cube_counts": Requirement((FFT, "numba")),
     "dimensions/covering": _SUMS,
     "dimensions/variation": Requirement((FFT, "numba")),
-    "contact": _SOLVER,
+    # where maps are kept, a caveat on the size of islands, which go on across periodic edges
+    "contact": Requirement((*_SOLVER.libraries, "scipy.ndimage", "scipy.sparse"), _SOLVER.kernels),
     # the registration of scikit-image has scipy's transforms of its own
     "joints/register": Requirement((FFT, "skimage.registration", "scipy.ndimage", "scipy.fft")),
     "joints/delta_dimension": Requirement((FFT,), (*_SUMS.kernels, "covering area")),
@@ -162,7 +165,7 @@ REQUIREMENTS = {
     "domains/signature": Requirement(_LABELS, ("islands", "gliding boxes")),
     "domains/hausdorff_content": Requirement((), ("quarters",)),
     "domains/lineage": Requirement(_LABELS),
-    FIGURES: Requirement(("matplotlib.figure", "matplotlib.backends.backend_agg")),
+    FIGURES: Requirement(("matplotlib.figure", "matplotlib.style", "matplotlib.backends.backend_agg")),
 }
 
 
@@ -344,7 +347,7 @@ def surplus(resources):
     unneeded += [
         f"{name} for {forms} types"
         for name, forms in zip(resources["kernel"].values, resources["kernel_forms"].values, strict=True)
-        if forms > 1
+        if forms > 1 + (name in IN_TWO_PRECISIONS)
     ]
     count, required = resources["kernel"].size, int(resources["required_kernel_count"])
     return unneeded + ([f"{count - required} more kernels than required"] if count > required else [])

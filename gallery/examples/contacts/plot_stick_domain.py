@@ -15,7 +15,7 @@ import numpy as np
 import fractalcontact as fc
 
 MODULUS, FRICTION, FORCE = 15.6e9, 0.6, 2000.0
-surface = fc.surfaces.spectral((256, 256), 1e-5, hurst=0.8, rms_slope=0.1, rng=4)
+surface = fc.surfaces.spectral((256, 256), 1e-5, hurst=0.8, rms_slope=0.1, rng=1)
 shares = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.9, 0.95])  # of the force of sliding
 sheared = {
     method: fc.contact.partial_slip(
