@@ -71,13 +71,15 @@ def covered(low, high, hurst):
 def is_fair(low, high, hurst, least=np.inf, slack=0.0):
     """Whether the intervals of the default and of increments hold H as often as they should.
 
-    Those of the default hold it more often, as any departure widens them: they are at most 1.6 times as wide
-    as those of the `least` standard deviation.
+    Those of the default hold it in up to .98, as any departure widens them: they are at most 1.6 times as
+    wide as those of the `least` standard deviation.
     """
     share, allowed = covered(low, high, hurst)
+    too_low, too_high = 0.95 - share, share[1:] - 0.95
+    of_default = 0.98 + 2.2 * np.sqrt(0.98 * 0.02 / len(low))  # two binomial standard deviations
     width = np.median(high - low, axis=0)[0] / (2 * 1.96 * least)
-    below, beyond = np.array([0.95, 0.95]) - share, share[1:] - 0.95
-    return bool((below < allowed + slack).all() and (beyond < allowed + slack).all() and width < 1.6)
+    holds = (too_low < allowed + slack).all() and (too_high < allowed + slack).all()
+    return bool(holds and share[0] < of_default + slack and width < 1.6)
 
 
 def test_bound_equals_published_values():
@@ -150,13 +152,13 @@ def test_unequal_spacings(hurst):
 
 TWO_OCTAVES = {"long_cutoff": 64e-4, "rolloff": 16e-4, "short_cutoff": 4e-4}
 TOO_HIGH = pytest.mark.xfail(reason="the exponent of two octaves is too high: .85 of the intervals hold .2")
+OF_BANDS = [
+    (0.2, {}), (0.5, {}), (0.9, {}), (0.5, TWO_OCTAVES), (0.9, TWO_OCTAVES),
+    pytest.param(0.2, TWO_OCTAVES, marks=TOO_HIGH),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("hurst", "cut"),
-    [(hurst, cut) for hurst in (0.2, 0.5, 0.9) for cut in ({}, TWO_OCTAVES) if cut == {} or hurst > 0.2]
-    + [pytest.param(0.2, TWO_OCTAVES, marks=TOO_HIGH)],
-)
+@pytest.mark.parametrize(("hurst", "cut"), OF_BANDS)
 def test_periodic_family(hurst, cut):
     """All modes of a square band: n times the least standard deviation is 1.383."""
     n, members = 128, 200

@@ -35,6 +35,8 @@ rough = fc.surfaces.fbm((256, 256), 1e-5, hurst=0.3, rms_increment=1e-7, rng=rng
 smooth = fc.surfaces.fbm((256, 256), 1e-5, hurst=0.9, rms_increment=4e-8, rng=rng)
 both = rough + smooth.values
 figure, (left, right) = plt.subplots(1, 2, figsize=(7.5, 3.2), layout="constrained")
-fc.plotting.scaling(fc.dimensions.scaling(scan), ax=left)
+octaves = fc.dimensions.scaling(scan)
+print(octaves)
+fc.plotting.scaling(octaves, ax=left)
 fc.plotting.scaling(fc.dimensions.scaling(both), ax=right)
 print(fc.dimensions.estimate(both).note.values)
