@@ -461,8 +461,8 @@ def _report(options: argparse.Namespace) -> int:
 def _export(options: argparse.Namespace) -> int:
     folder = options.out or Path(options.file).with_name("maps")
     written = fc.scenes.export(fc.open(options.file), folder, to=options.to, force=options.force)
-    number = "1 file, {}" if len(written) == 1 else f"{len(written)} files, {{}} ..."
-    print(f"written to {folder}: {number.format(written[0].name)}")
+    first, number = written[0].name, len(written)
+    print(f"written to {folder}: {f'1 file, {first}' if number == 1 else f'{number} files, {first} ...'}")
     return 0
 
 

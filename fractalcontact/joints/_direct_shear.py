@@ -323,6 +323,7 @@ def _peaks(positions: Array, columns: dict[str, Array], length: float) -> dict[s
         work = np.zeros_like(stress)
         work[:, 1:] = np.cumsum(stress[:, 1:] * np.diff(slip), axis=1)
         means.append(secant_slopes(slip, work.T, np.array([length]))[0])  # (point, test)
+    # where a mean over the length ends on the leg, whatever became of the tests
     is_on_leg = np.isfinite(secant_slopes(slip, slip, np.array([length]))[0])
     # NaN where the test ended on the leg: what the joint would have borne then is not known
     shear, normal = (mean[is_on_leg] for mean in means)

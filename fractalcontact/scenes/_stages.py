@@ -263,19 +263,26 @@ PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
 
 
 def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None = None) -> dict[str, float]:
-    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read.
+    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read."""
+    return _with_members(scene, stages, *_member_memory(scene, stages, face))
 
-    The stored maps of all members of an ensemble stay until they are joined, each group in turn.
+
+def _with_members(
+    scene: Scene, stages: Sequence[Stage], peaks: Mapping[str, float], stored: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the peak memory of each stage with the maps of the other members of an ensemble.
+
+    They stay until they are joined, each group in turn. The arguments are those of `_member_memory`.
     """
-    peaks, stored = _member_memory(scene, stages, face)
     others, joined = int(scene.surface.members or 1) - 1, 0.0
     kept = sum(stored.values())
+    result = dict(peaks)
     for name in peaks if others else ():
         own = (others + 1) * stored.get(name, 0.0)
         joined += own
         at_end = _libraries({stage.row.subpackage for stage in stages}) + (others + 1) * kept + joined
-        peaks[name] = max(peaks[name] + others * kept, at_end if own else 0.0)
-    return peaks
+        result[name] = max(peaks[name] + others * kept, at_end if own else 0.0)
+    return result
 
 
 def _member_memory(
@@ -325,13 +332,14 @@ def check_memory(
     scene: Scene, stages: Sequence[Stage], workers: int = 0, face: xr.DataArray | None = None
 ) -> None:
     """Raise `TooLittleMemory` unless the stage that needs most fits, in each of several processes."""
-    peaks = stage_memory(scene, stages, face)
+    of_one, stored = _member_memory(scene, stages, face)
+    peaks = _with_members(scene, stages, of_one, stored)
     if not peaks:
         return
     name = max(peaks, key=lambda stage: peaks[stage])
     processes = max(1, workers)
-    one = _member_memory(scene, stages, face)[0][name]  # this process alone has the maps of other members
-    needed = peaks[name] + one * (processes - 1) - STARTED  # that this process has taken
+    # this process alone has the maps of other members; `STARTED` it has taken already
+    needed = peaks[name] + of_one[name] * (processes - 1) - STARTED
     shared = f" in {processes} processes" if processes > 1 else ""
     require_memory("fractalcontact.scenes.run", needed, f"the stage {name}{shared}")
 

@@ -88,8 +88,8 @@ def template(
     Warns
     -----
     FractalContactWarning
-        The points of a face are too far apart for its JRC, which is left out. (It is left out without a
-        warning of a face with an edge below 5 mm.)
+        The points of a face are too far apart for its JRC, which is left out. A face with an edge below 5 mm
+        has no JRC either, without a warning.
 
     Raises
     ------
