@@ -28,7 +28,6 @@ from fractalcontact.dimensions._mode_fit import NEAR_ISOTROPY, FirstFit, first_f
 from fractalcontact.dimensions._records import CONSTANT, Estimate, joined, plane, smooth, undefined
 from fractalcontact.dimensions._spectral_posterior import (
     CORNER,
-    LEVEL,
     LONG_HURST,
     NOISE,
     SPREAD,
@@ -127,10 +126,8 @@ def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, k
     dx, unit = surface.spacing[1], first.scale * surface.unit
     inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx
     amplitude = math.sqrt(max(_amplitude(bins, found), 0.0))
-    is_noisy = known.noise is None and found.probability("is_noisy") > LEVEL
-    is_blurred = known.spread is None and found.probability("is_blurred") > LEVEL
-    spread = found.mean(SPREAD, "is_blurred") * dx if is_blurred else math.nan
-    height = amplitude * unit * found.mean(NOISE, "is_noisy") if is_noisy else math.nan
+    spread = found.named(SPREAD) * dx
+    height = amplitude * unit * found.named(NOISE) if known.noise is None else math.nan
     estimate = Estimate(
         hurst=middle,
         standard_error=deviation,
@@ -160,42 +157,46 @@ def _findings(found: Posterior, bins: Bins, dx: float, spread: float, height: fl
         notes.append(f"blur with a spread of {quantity_text(spread, 'm')}")
     if np.isfinite(height):
         notes.append(f"white noise with an rms height of {quantity_text(height, 'm')}")
-    if theta[CORNER] > 0.0 and found.probability("is_bent") > LEVEL:
+    if theta[CORNER] > 0.0 and np.isfinite(found.named(CORNER)):
         length = quantity_text(2.0 * np.pi / theta[CORNER] * dx, "m")
         notes.append(f"waves longer than about {length} have another exponent, {theta[LONG_HURST]:.2f}")
     if not discrepancy.inside.all():
         lengths = 2.0 * np.pi * dx * np.exp(-bins.lnq[discrepancy.inside])
         ends = quantity_text(float(lengths.min()), "m"), quantity_text(float(lengths.max()), "m")
         notes.append(f"one exponent describes the waves from {ends[0]} to {ends[1]} only")
+    elif math.isinf(discrepancy.length):
+        notes.append("a filter that is no Gaussian blur changes the short waves")
     elif discrepancy.scatter.max() > 0.0:
         share = 100.0 * float(discrepancy.scatter.max())
         notes.append(f"the spectrum differs from the model by about {share:.0f} %, which widens the interval")
     return notes
 
 
-def _residuals(bins: Bins, found: Posterior) -> Array:
-    """Return logarithms of the power over the model of the most probable hypothesis."""
-    hypothesis, _, theta = found.most_probable
-    return np.asarray(bins.level - bins.log_power(theta[None], hypothesis.form)[0][0])
+def _residuals(bins: Bins, found: Posterior) -> tuple[Array, Array]:
+    """Return logarithms of the power of the bins that count over the model of the most probable hypothesis,
+    with its filter, and their weights.
+    """
+    hypothesis, discrepancy, theta = found.most_probable
+    residuals = bins.level - bins.log_power(theta[None], hypothesis.form)[0][0]
+    if math.isinf(discrepancy.length):
+        q = discrepancy.scatter
+        residuals -= np.polyfit(q, residuals, 1, w=bins.variance**-0.5)[0] * q
+    return residuals[discrepancy.inside], 1.0 / bins.variance[discrepancy.inside]
 
 
 def _amplitude(bins: Bins, found: Posterior) -> float:
     """Return the square of the rms increment of the fractal over one spacing, over that of the heights."""
-    _, discrepancy, theta = found.most_probable
     if bins.noise > 0.0:
-        return float(np.square(bins.noise / theta[NOISE]))
-    inside = discrepancy.inside
-    residuals, weights = _residuals(bins, found)[inside], 1.0 / bins.variance[inside]
+        return float(np.square(bins.noise / found.most_probable[2][NOISE]))
+    residuals, weights = _residuals(bins, found)
     return math.exp(float(weights @ residuals / weights.sum()))
 
 
 def _misfit(bins: Bins, found: Posterior) -> float:
     """Return z of chi square of the bins about the most probable spectrum, octave by octave and azimuth."""
-    hypothesis, discrepancy, _ = found.most_probable
-    residuals = _residuals(bins, found)[discrepancy.inside]
-    weights = 1.0 / bins.variance[discrepancy.inside]
+    residuals, weights = _residuals(bins, found)
     residuals = residuals - weights @ residuals / weights.sum()
-    freedom = residuals.size - 1 - sum(math.isnan(value) for value in hypothesis.theta)
+    freedom = residuals.size - 1 - sum(map(math.isnan, found.most_probable[0].theta))
     if freedom < 1:
         return math.nan
     return float((weights @ np.square(residuals) - freedom) / math.sqrt(2.0 * freedom))

@@ -17,11 +17,13 @@ normal, and
     y_b = ln E_b + delta_b + eps_b,      eps: scatter of the modes in the bin                    (2)
 
 where delta is what (1) does not hold: nothing; a process of standard deviation tau, correlated over an
-octave; the fourth order in q of a filter that is no Gaussian; or a cut q_c beyond which the bins say
-nothing, with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2 (long waves).
+octave; the fourth order in q of a filter that is no Gaussian; its first order, as that of a lens or of a
+point spread with long tails, -a q with a > 0, half of a normal number of the deviation of a spacing; or a cut
+q_c beyond which the bins say nothing, with a process that grows to it as (q / q_c)^2 (short waves) or
+(q_c / q)^2 (long waves).
 
-Noise, a blur, a corner, sampling without aliases, a process and a cut are departures from an exact surface,
-independent of each other; all but noise have the same prior probability.
+Noise, a blur, a corner, sampling without aliases, a process, a first order and a cut are departures from an
+exact surface, independent of each other; all but noise have the same prior probability.
 
 For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
 unit normal variables u (the maxima, where the model holds), and Laplace's method gives its evidence and a
@@ -47,7 +49,8 @@ HURST, SPREAD, NOISE, CORNER, LONG_HURST, SHARPNESS = range(6)  # theta
 LOWEST, HIGHEST = 0.005, 0.995  # H: at 0 and 1 no sum of Gaussians has increments
 LEVEL = 0.95  # probability of an interval, and from which on a nuisance is named
 
-# Priors. Probability of each departure from an exact surface: blur, corner, no aliases, process, cut.
+# Priors. Probability of each departure from an exact surface: blur, corner, no aliases, process, first order
+# of a filter, cut.
 # Intervals of 10800 surfaces of 33 kinds, 128 x 128 points, hold H in .960, .968, .973, .978 and .984 with
 # .06, .08, .1, .12 and .15 (noise alike); fewer than .9 in 14, 12, 9, 6 and 5 of 96 cells; widths .85 to 1
 DEPARTURE = 0.1
@@ -126,20 +129,9 @@ class Hypothesis:
     theta: tuple[float, ...]
     log_prior: float
 
-    @property
-    def is_blurred(self) -> bool:
-        """Whether the spread of a blur is fitted."""
-        return math.isnan(self.theta[SPREAD])
-
-    @property
-    def is_noisy(self) -> bool:
-        """Whether white noise is fitted."""
-        return math.isnan(self.theta[NOISE])
-
-    @property
-    def is_bent(self) -> bool:
-        """Whether long waves have another exponent."""
-        return math.isnan(self.theta[CORNER])
+    def fits(self, parameter: int) -> bool:
+        """Return whether a parameter of theta is fitted: whether a blur, noise or a corner is there."""
+        return math.isnan(self.theta[parameter])
 
 
 @dataclass(frozen=True)
@@ -151,11 +143,14 @@ class Discrepancy:
     scatter : ndarray, shape (bins,)
     inside : ndarray of bool, shape (bins,)
     prior : float
+    length : float
+        Octaves over which it is correlated; infinite where one number multiplies all bins.
     """
 
     scatter: Array
     inside: Array
     prior: float
+    length: float = 1.0
 
 
 class Interval(NamedTuple):
@@ -206,18 +201,11 @@ class Posterior:
         m, k = np.unravel_index(int(np.argmax(self.share)), self.share.shape)
         return self.hypotheses[m], self.discrepancies[k], self.theta[m, k]
 
-    def probability(self, name: str) -> float:
-        """Return the probability of a property of the hypotheses, as "is_blurred"."""
-        return float(
-            sum(s.sum() for s, h in zip(self.share, self.hypotheses, strict=True) if getattr(h, name))
-        )
-
-    def mean(self, parameter: int, name: str) -> float:
-        """Return the mean of a parameter over the hypotheses with the property."""
-        chosen = np.array([getattr(h, name) for h in self.hypotheses])
-        return float(
-            np.sum(self.share[chosen] * self.theta[chosen, :, parameter]) / np.sum(self.share[chosen])
-        )
+    def named(self, parameter: int) -> float:
+        """Return the mean of a parameter of theta that is there with a probability of 95 %, else NaN."""
+        fits = np.array([hypothesis.fits(parameter) for hypothesis in self.hypotheses])
+        share, theta = self.share[fits], self.theta[fits, :, parameter]
+        return float(np.sum(share * theta) / share.sum()) if share.sum() > LEVEL else math.nan
 
 
 def mixture_interval(
@@ -327,7 +315,7 @@ def posterior(
         Maxima that are looked for without a discrepancy, and of a pilot.
     """
     chosen = hypotheses(known)
-    kinds = _discrepancies(bins, pilot_spread if known.spread is None else 0.0)
+    kinds = _discrepancies(bins, pilot_spread if known.spread is None else None)
     if known.is_window:
         kinds = [kind for kind in kinds if kind.inside.all()]
     if is_pilot:
@@ -363,6 +351,8 @@ def posterior(
     of_kind = np.r_[np.zeros(first, dtype=int), 1 : len(kinds)]
     prior_of = np.array([hypothesis.log_prior for hypothesis in chosen])[:, None] + constants[of_kind]
     evidence = prior_of - 0.5 * objective - 0.5 * np.linalg.slogdet(hessian)[1]
+    for k in np.flatnonzero([math.isinf(kinds[k].length) for k in of_kind]):
+        evidence[:, k] += _log_weakening(bins, _residuals(bins, prior, form, fixed, u[:, [k]])[:, 0])
     # two attempts within one standard deviation of the prior are one maximum: with .1 and 2 widths are the
     # same within 6 %
     distance = np.square(u[:, :first, None] - u[:, None, :first]).sum(axis=3)
@@ -374,14 +364,15 @@ def posterior(
 
 
 def _discrepancies(
-    bins: Bins, pilot_spread: float, *, room: float = 3.0, fourth_order: float = 0.125
+    bins: Bins, pilot_spread: float | None, *, room: float = 3.0, fourth_order: float = 0.125
 ) -> list[Discrepancy]:
     """Return the kinds of discrepancy with their prior probabilities, which sum to one.
 
     Parameters
     ----------
     bins : Bins
-    pilot_spread : float
+    pilot_spread : float, optional
+        None where the blur is known, and with it the filter.
     room : float
         Octaves that a cut leaves, to tell an exponent from a corner, and that are at most beyond it: filters
         of up to eight points, a levelled eighth of the extent.
@@ -399,14 +390,19 @@ def _discrepancies(
     cuts = [(_TAUS[-1] * 4.0 ** (octaves - cut), octaves <= cut) for cut in short_cuts]
     cuts += [(_TAUS[-1] * 4.0 ** (cut - octaves), octaves > cut) for cut in long_cuts]
     cuts = [(scatter, inside) for scatter, inside in cuts if inside.sum() >= 4 and not inside.all()]
-    fourth = fourth_order * np.minimum(pilot_spread * np.exp(bins.lnq), 3.0) ** 4
+    q = np.exp(bins.lnq)
+    fourth = fourth_order * np.minimum((pilot_spread or 0.0) * q, 3.0) ** 4
     has_fourth = bool(fourth.max() > 0.01)
     uncut = 1.0 - DEPARTURE if cuts else 1.0
-    holds = uncut * (1.0 - DEPARTURE) * (0.5 if has_fourth else 1.0)
+    first_order = DEPARTURE * (pilot_spread is not None)
+    smooth = uncut * (1.0 - DEPARTURE)
+    holds = smooth * (1.0 - first_order) * (0.5 if has_fourth else 1.0)
     kinds = [Discrepancy(np.zeros(octaves.size), everything, holds)]
     kinds += [
         Discrepancy(np.full(octaves.size, tau), everything, uncut * DEPARTURE / len(_TAUS)) for tau in _TAUS
     ]
+    if first_order:
+        kinds.append(Discrepancy(q, everything, smooth * first_order, math.inf))
     if has_fourth:
         kinds.append(Discrepancy(fourth, everything, holds))
     return kinds + [Discrepancy(scatter, inside, (1.0 - uncut) / len(cuts)) for scatter, inside in cuts]
@@ -421,7 +417,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e4) -> tuple[Array,
     """
     octaves = bins.lnq / _OCTAVE
     inside = np.ix_(kind.inside, kind.inside)
-    correlation = np.exp(-np.abs(octaves[:, None] - octaves))
+    correlation = np.exp(-np.abs(octaves[:, None] - octaves) / kind.length)
     covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
     lower = np.linalg.cholesky(covariance[inside] + (0.0 if bins.noise > 0.0 else flat))
     whitening = np.zeros(covariance.shape)
@@ -430,6 +426,19 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e4) -> tuple[Array,
     outside = bins.variance[~kind.inside] + _DEVIATION**2
     density = -np.log(np.diag(lower)).sum() - 0.5 * np.sum(np.log(outside) + 1.0)
     return whitening, math.log(kind.prior) + float(density)
+
+
+def _log_weakening(bins: Bins, residual: Array) -> Array:
+    """Return the logarithm of the probability that a filter of first order weakens waves, over one half.
+
+    That it strengthens them is the other half of its normal distribution, and impossible.
+    """
+    from scipy.special import log_ndtr
+
+    q, weight = np.exp(bins.lnq), 1.0 / bins.variance
+    weight = weight * (q - weight @ q / weight.sum())
+    precision = 1.0 + weight @ q
+    return np.asarray(math.log(2.0) + log_ndtr(-residual @ weight / math.sqrt(precision)))
 
 
 @lru_cache

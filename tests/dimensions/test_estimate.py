@@ -98,8 +98,8 @@ def test_fbm_within_bound(hurst, method):
     bound = 1.742 * np.sqrt(hurst / (hurst + 0.979)) / 128
     assert abs(float(result.hurst) - hurst) < 4 * bound
     # `likelihood` allows for noise and blur that the heights do not exclude
-    # the standard deviation of a posterior, with the tails of departures: .018 at H = .85
-    assert 0.9 * bound < float(result.standard_error) < 2.0 * bound
+    # the standard deviation of a posterior, with the tails of departures: .020 at H = .85
+    assert 0.9 * bound < float(result.standard_error) < 2.2 * bound
 
 
 @pytest.mark.parametrize("hurst", [0.2, 0.8])

@@ -131,12 +131,13 @@ def test_what_is_said_of_a_map_does_not_depend_on_its_orientation(damage, points
 
 @pytest.mark.parametrize("seed", [5, 15])
 def test_a_slightly_blurred_map_of_512_points(seed):
-    # with a coarser table of the expected power another exponent, .8, was as probable
+    # with a coarser table of the expected power another exponent, .8, was as probable; with a filter of first
+    # order in the model intervals are up to .061 wide, without it .046
     heights = fc.surfaces.fbm((560, 560), 1e-4, hurst=0.5, rms_increment=1e-6, rng=seed).values
     blurred = ndimage.gaussian_filter(heights, 1.0)[24:-24, 24:-24]
     found = fc.dimensions.estimate(fc.surfaces.from_array(blurred, 1e-4)).isel(method=0)
     assert found.hurst == pytest.approx(0.5, abs=0.03)
-    assert 0.02 < float(found.ci_high - found.ci_low) < 0.05
+    assert 0.02 < float(found.ci_high - found.ci_low) < 0.07
 
 
 def test_spacings_that_differ_by_orders_overflow_nothing():
@@ -144,3 +145,18 @@ def test_spacings_that_differ_by_orders_overflow_nothing():
     for spacing in ((1e-7, 3e-3), (3e-3, 1e-7), (0.12, 350.0)):
         found = fc.dimensions.estimate(fc.surfaces.from_array(heights, spacing)).isel(method=0)
         assert np.isfinite(found.ci_low) or str(found.reason.values)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.7])
+def test_a_point_spread_with_long_tails_leaves_the_exponent(hurst):
+    """The transfer function exp(-q / 2): as a Gaussian blur it gave an exponent .2 to .4 too high."""
+    height = fc.surfaces.fbm((144, 144), 1.0, hurst=hurst, rms_increment=1.0, rng=4).values
+    mirrored = np.pad(height, ((0, 144), (0, 144)), "symmetric")
+    q = 2.0 * np.pi * np.hypot(np.fft.fftfreq(288)[:, None], np.fft.rfftfreq(288))
+    seen = np.fft.irfft2(np.fft.rfft2(mirrored) * np.exp(-0.5 * q), mirrored.shape)[8:136, 8:136]
+    result = fc.dimensions.estimate(surface(seen)).isel(method=0)
+    assert float(result.ci_low) < hurst < float(result.ci_high)
+    assert float(result.ci_high - result.ci_low) < 0.3
+    assert "no Gaussian" in str(result.note.values)
+    blurred = fc.dimensions.estimate(surface(ndimage.gaussian_filter(height, 0.7)))
+    assert "no Gaussian" not in str(blurred.note[0].values)

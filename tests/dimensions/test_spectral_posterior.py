@@ -25,7 +25,7 @@ def log_density(bins, theta, form=0):
 def test_one_exponent_by_quadrature(hurst):
     bins = bins_of(hurst)
     found = sp.posterior(bins, sp.Known(0.0, 0.0))
-    plain = next(m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0)
+    plain = next(m for m, h in enumerate(found.hypotheses) if not h.fits(sp.CORNER) and h.form == 0)
     grid = np.linspace(0.01, 0.99, 500)
     logs = np.array([log_density(bins, np.array([h, 0.0, 0.0, 0.0, 0.0, 1.0])) for h in grid])
     weights = np.exp(logs - logs.max())
@@ -43,7 +43,8 @@ def test_one_exponent_by_quadrature(hurst):
 def test_evidence_of_noise_by_quadrature():
     bins = bins_of(0.6)
     found = sp.posterior(bins, sp.Known(0.0))
-    chosen = {h.is_noisy: m for m, h in enumerate(found.hypotheses) if not h.is_bent and h.form == 0}
+    plain = [m for m, h in enumerate(found.hypotheses) if not h.fits(sp.CORNER) and h.form == 0]
+    chosen = {found.hypotheses[m].fits(sp.NOISE): m for m in plain}
     ratio = found.share[chosen[True], 0] / found.share[chosen[False], 0]
     heights = np.linspace(0.01, 0.99, 100)
     # u of ln nu is normal; at equal steps of its probability the prior is a mean
@@ -118,3 +119,13 @@ def test_joint_interval_of_one_surface_is_its_own():
     found = sp.posterior(bins_of(0.5))
     low, _, high, _ = found.interval()
     assert sp.joint_interval([found]) == pytest.approx(found.interval(), abs=0.01 * (high - low))
+
+
+def test_a_filter_of_first_order_only_weakens():
+    """Beside levels that rise with the wavenumber it is impossible, beside falling ones twice as probable."""
+    bins = bins_of(0.5)
+    steps = np.array([[0.5], [0.0], [-0.5]]) * np.exp(bins.lnq)
+    rising, even, falling = np.exp(sp._log_weakening(bins, steps + 3.0))  # the amplitude does not matter
+    assert rising < 1e-6
+    assert even == pytest.approx(1.0)
+    assert falling == pytest.approx(2.0)

@@ -195,18 +195,32 @@ def under_oblique_lay(n: int, hurst: float, rng: Generator) -> Array:
     return brownian(5 * n, hurst, rng)[x + 2 * y, 4 * x + y]
 
 
+def filtered(n: int, hurst: float, rng: Generator, transfer: Callable[[Array], Array]) -> Array:
+    """Return a surface after a filter; `transfer` is that of radians per point."""
+    z = brownian(n + 2 * MARGIN, hurst, rng)
+    edge = z.shape[0]
+    mirrored = np.pad(z, ((0, edge), (0, edge)), "symmetric")  # so that opposite edges do not meet
+    q = 2.0 * np.pi * np.hypot(np.fft.fftfreq(2 * edge)[:, None], np.fft.rfftfreq(2 * edge))
+    seen = np.fft.irfft2(np.fft.rfft2(mirrored) * transfer(q), mirrored.shape)
+    return inner(seen[:edge, :edge], n)
+
+
 def through_lens(n: int, hurst: float, rng: Generator, finest: float) -> Array:
     """Return a surface seen by a lens without aberrations, in incoherent light (Goodman 2005).
 
     It shows no waves shorter than `finest` spacings.
     """
-    z = brownian(n + 2 * MARGIN, hurst, rng)
-    edge = z.shape[0]
-    mirrored = np.pad(z, ((0, edge), (0, edge)), "symmetric")  # so that opposite edges do not meet
-    share = np.minimum(finest * np.hypot(np.fft.fftfreq(2 * edge)[:, None], np.fft.rfftfreq(2 * edge)), 1.0)
-    transfer = 2.0 / np.pi * (np.arccos(share) - share * np.sqrt(1.0 - share**2))
-    seen = np.fft.irfft2(np.fft.rfft2(mirrored) * transfer, mirrored.shape)
-    return inner(seen[:edge, :edge], n)
+
+    def transfer(q: Array) -> Array:
+        share = np.minimum(finest * q / (2.0 * np.pi), 1.0)
+        return np.asarray(2.0 / np.pi * (np.arccos(share) - share * np.sqrt(1.0 - share**2)))
+
+    return filtered(n, hurst, rng, transfer)
+
+
+def long_tails(n: int, hurst: float, rng: Generator, width: float) -> Array:
+    """Return a surface after the point spread (1 + (r / width)^2)^(-3/2), r in points."""
+    return filtered(n, hurst, rng, lambda q: np.exp(-width * q))
 
 
 def modulated(n: int, hurst: float, rng: Generator) -> Array:
@@ -259,6 +273,7 @@ KINDS: dict[str, tuple[Callable[..., Array], tuple[float, ...]]] = {
     "anisotropic": (stretched, THREE),
     "oblique_lay": (under_oblique_lay, THREE),
     "lens": (partial(through_lens, finest=3.0), THREE),
+    "long_tails": (partial(long_tails, width=0.5), THREE),
     "modulated": (modulated, THREE),
     "profile": (profile, THREE),
     "profile_blur_1": (partial(profile, spread=1.0), THREE),
