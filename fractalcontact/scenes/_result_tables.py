@@ -142,9 +142,7 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
         data.isel(dict(zip(dims, place, strict=True)))
         for place in np.ndindex(*(data.sizes[dim] for dim in dims))
     ]
-    columns = {
-        column.head: cells for column in rows.columns if (cells := _cells(column, data, states)) is not None
-    }
+    columns = {column.head: cells for column in rows.columns if (cells := _cells(column, states)) is not None}
     if not columns or not states:
         return None
     key_heads, key_cells = [], []
@@ -184,28 +182,28 @@ def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
     return amount(value, scale=scale_for(units_of(value.name, value.attrs), data[dim].values))
 
 
-def _cells(column: Column, data: xr.Dataset, states: Sequence[xr.Dataset]) -> list[str] | None:
+def _cells(column: Column, states: Sequence[xr.Dataset]) -> list[str] | None:
     """Return the cells of a column; None where the result does not have it."""
+    found = [_value(column, state) for state in states]
+    if all(item is None for item in found):
+        return None
+    scale = _scale_of([item for item in found if isinstance(item, xr.DataArray)])
+    return [cell(item, column.decimals, scale) if item is not None else "-" for item in found]
+
+
+def _value(column: Column, state: xr.Dataset) -> Any:
+    """Return the value of a column in the state of one row; None where the result does not have it."""
     values = column.values
     if callable(values):
-        found = [values(state) for state in states]
-        if all(item is None for item in found):
-            return None
-        scale = _scale_of([item for item in found if isinstance(item, xr.DataArray)])
-        return [cell(item, column.decimals, scale) if item is not None else "-" for item in found]
-    if isinstance(values, tuple):
-        if not set(values) <= set(data.variables):
-            return None
-        low, high = values
-        return [interval(state[low], state[high], column.decimals) for state in states]
-    if values not in data.variables:
-        return None
-    scale = column_scale(data[values]) if column.decimals is None and data[values].dtype.kind == "f" else None
-    return [cell(state[values], column.decimals, scale) for state in states]
+        return values(state)
+    if isinstance(values, str):
+        return state[values] if values in state.variables else None
+    ends = [state[name] for name in values if name in state.variables]
+    return interval(ends[0], ends[1], column.decimals) if len(ends) == 2 else None
 
 
 def _scale_of(cells: Sequence[xr.DataArray]) -> Scale | None:
-    """Return one unit for the cells of a column that a function takes."""
+    """Return one unit for the cells of a column."""
     if not cells or any(each.dtype.kind not in "fiu" for each in cells):
         return None
     together = np.concatenate([finite(each) for each in cells])
