@@ -313,7 +313,7 @@ STAGES = (
         table="upper",
         takes="file",
     ),
-    _joint("delta_surface", one_direction=True),
+    _joint("delta_surface"),
     _joint(
         "delta_dimension",
         "dimension of the delta-surface",
@@ -321,7 +321,6 @@ STAGES = (
         Column("D of the delta-surface, by area", "covering_dimension", 3),
         Column("by variogram", "variogram_dimension", 3, screen=False),
         Column("by spectrum", "spectrum_dimension", 3, screen=False),
-        one_direction=True,
     ),
     _joint(
         "rigid_dilatancy",
@@ -345,7 +344,6 @@ STAGES = (
         keeps=CONTACT_MAPS,
         splits=("shear", "step"),
         presses=True,
-        one_direction=True,
     ),
     _joint(
         "closure_laws",
@@ -375,7 +373,6 @@ STAGES = (
         keys=("block", "shear", "direction", *LOADS, "bulk", "influence", "disc_radius", "tolerance"),
         required=("block",),
         fixed={"method": "elimination"},
-        one_direction=True,
     ),
     _joint(
         "area_by_resolution",
@@ -386,7 +383,6 @@ STAGES = (
         Column("area dimension", "area_dimension", 2),
         splits=("shear",),
         presses=True,
-        one_direction=True,
     ),
     _joint(
         PARTIAL_SLIP,
@@ -395,7 +391,6 @@ STAGES = (
         splits=("shear",),
         presses=True,
         refuses_hardness=True,
-        one_direction=True,
     ),
     _joint(
         "elastic_dilatancy",
@@ -454,7 +449,6 @@ STAGES = (
         Column("worn depth", lambda state: state["wear_depth"].max("point", keep_attrs=True)),
         remarks=_pressure_of_a_spring,
         splits=("nominal_pressure",),
-        one_direction=True,
         presses=True,
     ),
     _of_surface(
@@ -464,7 +458,6 @@ STAGES = (
         Column("peak strength (shear curve)", "peak_shear_strength"),
         Column("at displacement", "peak_displacement"),
         remarks=_outside_criterion,
-        one_direction=True,
     ),
     _of_surface(
         "strength_envelope",
@@ -474,7 +467,6 @@ STAGES = (
         Column("friction angle", "friction_angle", screen=False),
         Column("in its range", "in_range", screen=False),
         remarks=_criteria,
-        one_direction=True,
     ),
     _joint(
         "self_weight",
@@ -492,7 +484,6 @@ STAGES = (
         ("direction",),
         Column("decorrelation length", "decorrelation_length"),
         Column("95 % interval", ("decorrelation_length_low", "decorrelation_length_high"), screen=False),
-        one_direction=True,
     ),
     _of_gap(
         "transmissivity",

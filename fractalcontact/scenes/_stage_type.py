@@ -86,8 +86,6 @@ class StageType:
         It solves a contact: it needs elastic constants, and which loads are possible depends on the heights.
     may_be_rigid, refuses_hardness : bool
         It computes rigid faces where the material has no elastic constants; it knows elastic bodies alone.
-    one_direction : bool
-        It takes one direction.
     keys, own : tuple of str
         The arguments that a scene may give, where they are not all of the function; and those of them that
         only its own table gives.
@@ -113,7 +111,6 @@ class StageType:
     presses: bool = False
     may_be_rigid: bool = False
     refuses_hardness: bool = False
-    one_direction: bool = False
     keys: tuple[str, ...] = ()
     own: tuple[str, ...] = ()
     required: tuple[str, ...] = ()
@@ -142,6 +139,12 @@ class StageType:
     def one_load(self) -> bool:
         """Whether a scene gives it one path of load, of several that the function takes."""
         return sum(key in LOADS for key in self.arguments()) > 1
+
+    @property
+    def one_direction(self) -> bool:
+        """Whether it takes one direction: its table has no row for each of several."""
+        has_rows = self.rows is not None and "direction" in self.rows.over
+        return "direction" in self.arguments() and not has_rows
 
     def needed(self) -> tuple[str, ...]:
         """Return the arguments that a scene must give."""
