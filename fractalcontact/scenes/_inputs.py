@@ -145,8 +145,8 @@ def locate(path: str, folder: Path) -> Path:
 
 def values_of(scene: Scene, row: StageType) -> dict[str, Any]:
     """Return what the tables of a stage give: its own one, [joint.closure], before the whole one, [joint]."""
-    common, own = _tables(scene, row)
-    return {key: value for key, value in common.items() if key not in row.own} | own
+    common = {key: value for key, value in _common_values(scene, row).items() if key not in row.own}
+    return common | own_values(scene, row)
 
 
 def given_options(scene: Scene, row: StageType) -> dict[str, Any]:
@@ -157,20 +157,24 @@ def given_options(scene: Scene, row: StageType) -> dict[str, Any]:
 
 def loads_of(scene: Scene, row: StageType) -> list[str]:
     """Return the loads of a stage: those of its own table, else those of the whole table."""
-    common, own = _tables(scene, row)
+    common, own = _common_values(scene, row), own_values(scene, row)
     allowed = [key for key in LOADS if key in row.arguments()]
     return [key for key in allowed if key in own] or [key for key in allowed if key in common]
 
 
-def _tables(scene: Scene, row: StageType) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the values of the whole table of a stage, [joint], and its own table, [joint.closure]."""
+def own_values(scene: Scene, row: StageType) -> dict[str, Any]:
+    """Return the values of the own table of a stage, [joint.closure]."""
     name, _, word = row.table.partition(".")
-    table = scene.table(name)
-    own = table.get(word)
+    own = scene.table(name).get(word)
+    return own if isinstance(own, dict) else {}
+
+
+def _common_values(scene: Scene, row: StageType) -> dict[str, Any]:
+    """Return the values of the whole table of a stage, [joint]."""
+    table = scene.table(row.table.partition(".")[0])
     # a stage may have the name of an argument ([joint.closure]), so sub-tables are not values; the block of
     # a joint is that of its crack, and only one in the table of a stage is an argument
-    common = {key: value for key, value in table.items() if not isinstance(value, dict) and key != "block"}
-    return common, own if isinstance(own, dict) else {}
+    return {key: value for key, value in table.items() if not isinstance(value, dict) and key != "block"}
 
 
 def stage_options(scene: Scene, row: StageType) -> dict[str, Any]:
@@ -203,7 +207,7 @@ def call_options(scene: Scene, row: StageType, keep: tuple[str, ...]) -> dict[st
 def crack_options(scene: Scene, row: StageType | None = None) -> dict[str, Any]:
     """Return the arguments of `Crack` but for the surfaces; a stage may have a block of its own."""
     material = scene.material
-    own = {} if row is None else scene.joint.stages.get(row.word, {})
+    own = {} if row is None else own_values(scene, row)
     options = {
         "young": material.young,
         "poisson": material.poisson,

@@ -65,7 +65,7 @@ class MaterialTable:
 
 @dataclass(frozen=True)
 class JointTable:
-    """`[joint]`: the block that slides and the arguments of the stages of a joint.
+    """`[joint]`: the block that slides, and how measured faces come into place.
 
     Attributes
     ----------
@@ -75,14 +75,11 @@ class JointTable:
         Bring two measured faces into mated position first.
     turn_upper : str, optional
         The axis about which an upper body that was scanned face up is turned over.
-    stages : mapping
-        `[joint.closure]` and so on: arguments of one stage, which replace the common ones.
     """
 
     block: Any = None
     register: bool = False
     turn_upper: str | None = None
-    stages: Mapping[str, Table] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -97,9 +94,6 @@ class WantTable:
     keep: tuple[str, ...] = ()
     figures: bool = False
     datasheet: bool = False
-
-
-MATERIAL_KEYS = tuple(entry.name for entry in fields(MaterialTable))
 
 
 @dataclass(frozen=True, repr=False)
@@ -159,16 +153,12 @@ class Scene:
     @cached_property
     def material(self) -> MaterialTable:
         """The material of both bodies."""
-        table = self.table("material")  # unknown keys are reported where the scene is read
-        return MaterialTable(**{key: value for key, value in table.items() if key in MATERIAL_KEYS})
+        return MaterialTable(**_typed(MaterialTable, self.table("material")))
 
     @cached_property
     def joint(self) -> JointTable:
-        """The joint and its stages."""
-        table = self.table("joint")
-        stages = {key: value for key, value in table.items() if isinstance(value, dict)}
-        register = bool(table.get("register", False))
-        return JointTable(table.get("block"), register, table.get("turn_upper"), stages)
+        """The joint."""
+        return JointTable(**_typed(JointTable, self.table("joint")))
 
     @cached_property
     def want(self) -> WantTable:
@@ -212,6 +202,11 @@ def _short(value: Any) -> str:
 
 
 def _surface_table(table: Table) -> SurfaceTable:
-    typed = {entry.name for entry in fields(SurfaceTable)} - {"options"}
-    own = {key: value for key, value in table.items() if key in typed}
-    return SurfaceTable(**own, options={key: value for key, value in table.items() if key not in typed})
+    own = _typed(SurfaceTable, table)
+    return SurfaceTable(**own, options={key: value for key, value in table.items() if key not in own})
+
+
+def _typed(kind: Any, table: Table) -> dict[str, Any]:
+    """Return the values of a table that a typed one has; unknown keys are reported where a scene is read."""
+    names = {entry.name for entry in fields(kind)} - {"options"}  # these are the other keys
+    return {key: value for key, value in table.items() if key in names}

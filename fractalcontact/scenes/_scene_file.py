@@ -20,7 +20,7 @@ from fractalcontact.base.validation import NONE, Problems, Words, did_you_mean, 
 from fractalcontact.scenes import _scene_keys
 from fractalcontact.scenes._inputs import FROM_MATERIAL, given_options, loads_of
 from fractalcontact.scenes._results_folder import folder_of
-from fractalcontact.scenes._scene import LOADS, MATERIAL_KEYS, Scene, Table
+from fractalcontact.scenes._scene import LOADS, Scene, Table
 from fractalcontact.scenes._scene_keys import Keys
 from fractalcontact.scenes._stage_type import StageType
 from fractalcontact.scenes._stages import STAGES, Stage, stages_of
@@ -285,7 +285,7 @@ def _check_arguments(scene: Scene, stage: Stage, problems: Problems) -> None:
         problems.add(f"{place}.{key}", f"a value for {name} ({reason}){elsewhere}", NONE)
     direction = options.get("direction", "E")
     if row.one_direction and isinstance(direction, list):
-        problems.add("joint.direction", f"one direction for {name}", direction)
+        problems.add(f"{row.table.partition('.')[0]}.direction", f"one direction for {name}", direction)
     if row.one_load and len(loads := loads_of(scene, row)) != 1:
         *others, last = (key for key in LOADS if key in row.arguments())
         expected = f"exactly one of {', '.join(others)} or {last} for {name} ({reason})"
@@ -296,7 +296,7 @@ def _home_of(key: str, place: str) -> str:
     """Return the other tables that a key belongs to, also one that is written as the symbol of the field."""
     name = SYMBOLS.get(key.lower(), key)
     tables = [row.table for row in STAGES.values() if row.table and name in row.arguments()]
-    tables += ["material"] if name in MATERIAL_KEYS else []
+    tables += ["material"] if name in _scene_keys.MATERIAL else []
     homes = [f"[{table}]" for table in tables if table != place]
     if not homes:
         return ""

@@ -254,8 +254,8 @@ def _validate_calls(
         with _collected(problems, stage.name, row.table, row.table.partition(".")[0], ignored=ignored):
             if row.takes == "crack":
                 subject = crack
-                own_block = scene.joint.stages.get(row.word, {}).get("block")
-                if crack is not None and own_block is not None and _is_valid(problems, f"{row.table}.block"):
+                has_own = "block" in _inputs.own_values(scene, row)
+                if crack is not None and has_own and _is_valid(problems, f"{row.table}.block"):
                     subject = _inputs.crack_of(scene, surfaces["surface"], surfaces.get("upper"), row)
             elif row.takes == "map":
                 subject = _empty_maps(scene, surface, crack, row)
