@@ -21,7 +21,7 @@ from fractalcontact.base import fft
 from fractalcontact.base import rng as streams
 from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CONVENTIONS
-from fractalcontact.base.study import MEMBER, NO_REFERENCES
+from fractalcontact.base.study import MEMBER, NO_REFERENCES, entries_in
 
 LOADS = ("closure", "normal_force", "nominal_pressure")
 SHARED = "pressed"  # the argument of which every part takes what it needs: the whole is that of any part
@@ -222,10 +222,8 @@ def member_entry(entry: Any, member: int) -> Any:
 
 def member_count(entry: Any, dim: str = MEMBER) -> int | None:
     """Return the number of members, or scans, that a provenance describes; None for a single result."""
-    items = entry if isinstance(entry, list) else list(entry.values()) if isinstance(entry, dict) else []
-    if isinstance(entry, dict) and set(entry) == {dim} and isinstance(entry[dim], list):
-        return len(entry[dim])
-    return next((count for item in items if (count := member_count(item, dim)) is not None), None)
+    of_members = (each[dim] for each in entries_in(entry) if set(each) == {dim})
+    return next((len(values) for values in of_members if isinstance(values, list)), None)
 
 
 def _read(provenance: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,18 +62,23 @@ def provenance_of(data: Any) -> dict[str, Any]:
     return entry if isinstance(entry, dict) else {}
 
 
-def stated_argument(entry: Any, names: Sequence[str]) -> str:
+def entries_in(provenance: Any) -> Iterator[dict[str, Any]]:
+    """Yield every table in a provenance: those of the calls that made its arguments after its own."""
+    if isinstance(provenance, dict):
+        yield provenance
+        provenance = list(provenance.values())
+    for each in provenance if isinstance(provenance, list) else ():
+        yield from entries_in(each)
+
+
+def stated_argument(provenance: Any, names: Sequence[str]) -> str:
     """Return which of some arguments the call of a provenance states, else one that made its arguments.
 
     Of several the first of `names`; empty where none is stated.
     """
-    if isinstance(entry, list):
-        return next(filter(None, (stated_argument(each, names) for each in entry)), "")
-    if not isinstance(entry, dict):
-        return ""
-    parameters = entry.get("parameters")
-    stated = [name for name in names if isinstance(parameters, dict) and parameters.get(name) is not None]
-    return stated[0] if stated else stated_argument(list(entry.values()), names)
+    calls = (each.get("parameters") for each in entries_in(provenance))
+    known = (call for call in calls if isinstance(call, dict))
+    return next((name for call in known for name in names if call.get(name) is not None), "")
 
 
 def end_of_first_leg(test: xr.Dataset) -> str:

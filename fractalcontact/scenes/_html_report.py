@@ -28,6 +28,7 @@ from fractalcontact.base.resources import thread_count
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.study import (
     NO_REFERENCES,
+    entries_in,
     group_of,
     member_count,
     of_member,
@@ -199,15 +200,12 @@ def _page(
     )
 
 
-def _input_files(entry: Any) -> Iterator[tuple[str, str]]:
+def _input_files(provenance: Any) -> Iterator[tuple[str, str]]:
     """Yield the name and the SHA-256 of every file that a provenance states, in it and in its arguments."""
-    if isinstance(entry, dict):
-        parameters = entry.get("parameters")
-        if isinstance(entry.get("file_sha256"), str) and isinstance(parameters, dict):
-            yield str(parameters.get("path", parameters.get("name", ""))), entry["file_sha256"]
-        entry = list(entry.values())
-    for each in entry if isinstance(entry, list) else ():
-        yield from _input_files(each)
+    for each in entries_in(provenance):
+        checksum, call = each.get("file_sha256"), each.get("parameters")
+        if isinstance(checksum, str) and isinstance(call, dict):
+            yield str(call.get("path", call.get("name", ""))), checksum
 
 
 def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from fractalcontact.base.file_contents import remarks
-from fractalcontact.base.study import MEMBER, group_of, provenance_of
+from fractalcontact.base.study import MEMBER, entries_in, group_of, provenance_of
 from fractalcontact.base.units import quantity_text
 from fractalcontact.scenes._result_tables import Column, Rows, length, plain, share_of
 from fractalcontact.scenes._scene import PRESS
@@ -37,11 +36,9 @@ def _gridding(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield how a cloud of points became a surface: points, cells, and the plane below the heights."""
     surface = group_of(tree, "surfaces")
     statistics = data if surface is None else surface
-    record: Any = provenance_of(statistics)
-    while isinstance(record, dict) and "point_distance" not in record:  # what was done to the surface later
-        record = record.get("parameters", {}).get("surface", {})
-        record = record.get("provenance") if isinstance(record, dict) else None
-    if not isinstance(record, dict) or not {"y", "x"} <= set(statistics.sizes):
+    made = (each for each in entries_in(provenance_of(statistics)) if "point_distance" in each)
+    record = next(made, None)
+    if record is None or not {"y", "x"} <= set(statistics.sizes):
         return
     spacing = length(float(statistics["x"][1] - statistics["x"][0]))
     cells = " x ".join(str(statistics.sizes[dim]) for dim in ("y", "x"))
