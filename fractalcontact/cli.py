@@ -255,7 +255,7 @@ def _answer(options: argparse.Namespace) -> int:
         remedy = f"fractalcontact run {target} -o {folder} runs it, --force overwrites it"
         expected = "no scene of yours under the name of the one that is written"
         got = f"{target.name!r} ({remedy})"
-        raise InvalidInput(f"fractalcontact {options.question}", [f"-o: expected {expected}, got {got}"])
+        raise InvalidInput.of(f"fractalcontact {options.question}", "-o", expected, got)
     scene = fc.scenes.Scene(options.question, tomllib.loads(text), Path(folder).absolute())
     options.out, options.scene = folder, scene
     is_refused = False
@@ -308,7 +308,7 @@ def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.
     title, target = f"Roughness of the profile {name}", folder / files.RESULT
     if target.exists() and not options.force and fc.open(target).attrs.get("title") != title:
         expected = "a folder without results of another study (another folder, or --force)"
-        raise InvalidInput("fractalcontact roughness", [f"-o: expected {expected}, got {folder.name!r}"])
+        raise InvalidInput.of("fractalcontact roughness", "-o", expected, repr(folder.name))
     profile = fc.surfaces.despike(heights) if options.despike else heights
     level = 1 if options.level is None else options.level
     levelled = fc.surfaces.level(profile, level) if level else profile
@@ -340,7 +340,7 @@ def _init(options: argparse.Namespace) -> int:
     target, shipped = Path(options.scene), files.datasets_folder()
     if target.exists() or not target.parent.is_dir():
         expected = "the name of a new file in an existing folder"
-        raise InvalidInput("fractalcontact init", [f"scene: expected {expected}, got {target.name!r}"])
+        raise InvalidInput.of("fractalcontact init", "scene", expected, repr(target.name))
     target.write_text((shipped / "new_scene.toml").read_text(encoding="utf-8"), encoding="utf-8")
     target.with_name(files.SCHEMA).write_bytes((shipped / files.SCHEMA).read_bytes())
     print(f"written: {target}, and {files.SCHEMA} for editors\nfractalcontact run {target} -o out")
@@ -387,9 +387,7 @@ def _client(address: str | None) -> Iterator[Any]:
         client = Client(address)
     except (OSError, ValueError) as error:
         expected = "the address of a running dask scheduler"
-        raise InvalidInput(
-            "fractalcontact run", [f"--scheduler: expected {expected}, got {address!r}"]
-        ) from error
+        raise InvalidInput.of("fractalcontact run", "--scheduler", expected, repr(address)) from error
     with client:
         yield client
 

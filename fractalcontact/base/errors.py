@@ -4,6 +4,7 @@ import importlib.util
 import inspect
 import warnings
 from collections.abc import Sequence
+from typing import Self
 
 
 class FractalContactError(Exception):
@@ -26,6 +27,11 @@ class InvalidInput(FractalContactError, ValueError):
         self.problems = tuple(problems)
         super().__init__(where, self.problems)
 
+    @classmethod
+    def of(cls, where: str, argument: str, expected: str, got: object) -> Self:
+        """Return the error of a single problem."""
+        return cls(where, [problem_text(argument, expected, got)])
+
     def __reduce__(self) -> tuple[type[Exception], tuple[str, Sequence[str]]]:
         """Return what pickle makes the error again from, in another process."""
         return type(self), (self.where, self.problems)
@@ -35,6 +41,11 @@ class InvalidInput(FractalContactError, ValueError):
         count = len(self.problems)
         head = f"{self.where}: {count} problem{'s' * (count != 1)}"
         return "\n".join([head, *(f"  - {problem}" for problem in self.problems)])
+
+
+def problem_text(argument: str, expected: str, got: object) -> str:
+    """Return what a problem of an argument, or of a file, is called in every error."""
+    return f"{argument}: expected {expected}, got {got}"
 
 
 class UnreadableFile(InvalidInput):

@@ -73,9 +73,8 @@ def output_folder(out: str | os.PathLike[str]) -> Path:
         if not os.access(out, os.W_OK):
             raise PermissionError(errno.EACCES, "no permission to write")
     except OSError as error:
-        raise InvalidInput(
-            WHERE, [f"out: expected a folder to write in, got {out.name!r}: {error.strerror}"]
-        ) from error
+        got = f"{out.name!r}: {error.strerror}"
+        raise InvalidInput.of(WHERE, "out", "a folder to write in", got) from error
     return out
 
 
@@ -96,7 +95,7 @@ def locked(folder: Path | None) -> Iterator[None]:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 got = f"{folder.name!r}: another run is writing in it"
-                raise InvalidInput(WHERE, [f"out: expected a folder of its own, got {got}"]) from None
+                raise InvalidInput.of(WHERE, "out", "a folder of its own", got) from None
         yield
     finally:
         os.close(descriptor)

@@ -185,9 +185,7 @@ def _labelled(where: str, value: Any, spacing: Any) -> xr.DataArray:
     try:
         heights = np.ma.filled(np.ma.asarray(value, dtype=np.float64), np.nan)
     except (TypeError, ValueError) as error:
-        raise InvalidInput(
-            where, [f"{SURFACE}: expected an array of real numbers, got {value!r:.60}"]
-        ) from error
+        raise InvalidInput.of(where, SURFACE, "an array of real numbers", f"{value!r:.60}") from error
     core = ("y", "x")[2 - heights.ndim :]
     steps = np.broadcast_to(float_array(spacing), heights.ndim)
     coords = plane_coords(heights.shape, steps.tolist(), (False,) * heights.ndim, core)

@@ -117,7 +117,7 @@ def require_libraries() -> None:
         if free.size < 0.0:
             fewer = "" if openblas_threads() == 1 else " (less with OPENBLAS_NUM_THREADS=1)"
             expected = f"about {in_words(-free.size)} more to load NumPy, SciPy and Numba{fewer}"
-            raise TooLittleMemory("fractalcontact", [f"memory: expected {expected}, got the {free.limit}"])
+            raise TooLittleMemory.of("fractalcontact", "memory", expected, f"the {free.limit}")
 
 
 def _free_of_groups(root: Path) -> Iterator[Free]:
@@ -174,7 +174,7 @@ def require_memory(where: str, needed: float, what: str) -> None:
     free = free_memory()
     if not needed <= free.size:
         expected = f"at most {in_words(free.size)} ({free.limit})"
-        raise TooLittleMemory(where, [f"memory: expected {expected}, got {what}: about {in_words(needed)}"])
+        raise TooLittleMemory.of(where, "memory", expected, f"{what}: about {in_words(needed)}")
 
 
 def peak_of(estimate: Estimate, arguments: Mapping[str, Any], *, in_blocks: bool = False) -> float:

@@ -257,7 +257,7 @@ def _named_errors(name: str) -> Iterator[None]:
         raise
     except MemoryError as error:
         got = str(error) or "a request that the system refused"
-        raise TooLittleMemory(name, [f"memory: expected enough for this call, got: {got}"]) from error
+        raise TooLittleMemory.of(name, "memory", "enough for this call", got) from error
 
 
 def public_name(function: Callable[..., Any]) -> str:

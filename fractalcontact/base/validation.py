@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fractalcontact.base.errors import InvalidInput, TooLittleMemory, UnreadableFile
+from fractalcontact.base.errors import InvalidInput, TooLittleMemory, UnreadableFile, problem_text
 from fractalcontact.base.numbers import is_real, number_of_axes, real_numbers
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ class Problems:
     def add(self, argument: str, expected: str, got: object = GIVEN) -> None:
         """Note that `argument` should have been `expected` and was `got`."""
         got = self._value(argument, got)
-        self.note(argument, f"{argument}: expected {expected}, got {_shown(got)}")
+        self.note(argument, problem_text(argument, expected, _shown(got)))
 
     def note(self, argument: str, message: str) -> None:
         """Note a problem of an argument in words that are ready."""

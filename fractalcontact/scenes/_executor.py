@@ -76,9 +76,7 @@ def workers_of(client: Any) -> Workers | None:
             client, count, local=isinstance(client, (futures.ProcessPoolExecutor, futures.ThreadPoolExecutor))
         )
     expected = "a distributed.Client, a concurrent.futures.Executor or None"
-    raise InvalidInput(
-        "fractalcontact.scenes.run", [f"client: expected {expected}, got {type(client).__name__}"]
-    )
+    raise InvalidInput.of("fractalcontact.scenes.run", "client", expected, type(client).__name__)
 
 
 @contextmanager

@@ -52,8 +52,8 @@ def read_surface(table: SurfaceTable, folder: Path, lower: xr.DataArray | None =
             options["plane"] = lower
         surface = surfaces.read(locate(str(table.read), folder), **options)
         if "y" not in surface.dims:
-            remedy = "see fractalcontact.dimensions.estimate"
-            raise InvalidInput("surface", [f"read: expected a surface, got a profile: {remedy}"])
+            got = "a profile: see fractalcontact.dimensions.estimate"
+            raise InvalidInput.of("surface", "read", "a surface", got)
     source, done = surface.attrs["references"], []
     if table.generate is None and (missing := int(surface.isnull().sum())):
         done.append(f"{100 * missing / surface.size:.3g} % of the points are missing")
@@ -140,7 +140,7 @@ def locate(path: str, folder: Path) -> Path:
     for candidate in (beside, datasets_folder() / expanded):
         if candidate.is_file():
             return candidate
-    raise InvalidInput("surface", [f"read: expected an existing file, got {path!r}"])
+    raise InvalidInput.of("surface", "read", "an existing file", repr(path))
 
 
 def values_of(scene: Scene, row: StageType) -> dict[str, Any]:

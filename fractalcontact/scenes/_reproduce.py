@@ -118,9 +118,7 @@ class _Source:
             return self._input(name, value)
         if "shape" in value:
             expected = "an input that is stated in full, or made by this package"
-            raise InvalidInput(
-                WHERE, [f"{name}: expected {expected}, got an array of shape {value['shape']}"]
-            )
+            raise InvalidInput.of(WHERE, name, expected, f"an array of shape {value['shape']}")
         return value
 
     def _crack(self, summary: Mapping[str, Any]) -> Any:
@@ -134,7 +132,7 @@ class _Source:
         entry = summary.get("provenance")
         if not isinstance(entry, Mapping):
             expected = "an input with the provenance of this package"
-            raise InvalidInput(WHERE, [f"{name}: expected {expected}, got one of sizes {summary['dims']}"])
+            raise InvalidInput.of(WHERE, name, expected, f"one of sizes {summary['dims']}")
         made = self.make(entry)
         if "name" not in summary:
             return made
@@ -156,7 +154,7 @@ class _Source:
             if provenance.file_checksum(path) == stated:
                 return path
         got = "one of another content (SHA-256)" if places else "no such file"
-        raise InvalidInput(WHERE, [f"folder: expected the file {name!r} that was read, got {got}"])
+        raise InvalidInput.of(WHERE, "folder", f"the file {name!r} that was read", got)
 
 
 def _function(stated: Any) -> str:
@@ -164,5 +162,5 @@ def _function(stated: Any) -> str:
     package, _, name = str(stated).partition(".")
     is_known = package == PACKAGE and name.partition(".")[0] in SUBPACKAGES and name.count(".") == 1
     if not is_known or not hasattr(public_function(name), "validate"):
-        raise InvalidInput(WHERE, [f"call: expected a public function that returns a result, got {stated!r}"])
+        raise InvalidInput.of(WHERE, "call", "a public function that returns a result", repr(stated))
     return name

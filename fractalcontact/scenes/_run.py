@@ -296,10 +296,8 @@ def _beside_the_result() -> Iterator[None]:
         if not isinstance(error, OSError):
             raise
         expected = f"figures and a report beside {RESULT}, which is complete; the same run makes them"
-        reason = error.strerror or str(error)
-        raise InvalidInput(
-            "fractalcontact.scenes.run", [f"out: expected {expected}, got: {reason}"]
-        ) from error
+        got = error.strerror or str(error)
+        raise InvalidInput.of("fractalcontact.scenes.run", "out", expected, got) from error
 
 
 def _draw(tree: xr.DataTree, folder: Path, progress: bool) -> list[Path]:

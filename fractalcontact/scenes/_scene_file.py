@@ -150,9 +150,8 @@ def _find(path: Path) -> Path:
     if path.parent.name in ("", "datasets") and shipped.is_file():
         return shipped
     names = ", ".join(sorted(scene.stem for scene in datasets_folder().glob("*.toml")))
-    raise UnreadableFile(
-        "scene", [f"path: expected a scene file or one of {names}, got {path.name!r}: no such file"]
-    )
+    got = f"{path.name!r}: no such file"
+    raise UnreadableFile.of("scene", "path", f"a scene file or one of {names}", got)
 
 
 def _in_plain_words(value: Any, key: str, place: str, problems: Problems) -> Any:

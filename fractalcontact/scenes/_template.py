@@ -224,10 +224,10 @@ def _first_surface(scan: Files, options: Mapping[str, Any]) -> xr.DataArray:
 def _facts(surface: xr.DataArray) -> dict[str, Any]:
     """Return spacing and extent of a surface, and whether it has gaps."""
     if surface.ndim > 2:
-        raise InvalidInput(WHERE, [f"scan: expected one surface, got a stack with dims {surface.dims}"])
+        raise InvalidInput.of(WHERE, "scan", "one surface", f"a stack with dims {surface.dims}")
     if "y" not in surface.dims:
-        message = "scan: expected a surface, got a profile: see fractalcontact.dimensions.estimate"
-        raise InvalidInput(WHERE, [message])
+        got = "a profile: see fractalcontact.dimensions.estimate"
+        raise InvalidInput.of(WHERE, "scan", "a surface", got)
     grid = read_grid(surface)
     return {
         "spacing": max(grid.spacing),
