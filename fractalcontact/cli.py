@@ -13,7 +13,7 @@ import sys
 import textwrap
 import warnings
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import takewhile
 from pathlib import Path
@@ -39,6 +39,7 @@ HELP = {  # of options, where it is long
     "command continues",
     "question folder": "folder for the results (default: SCAN_QUESTION, without suffix; of many scans "
     "their folder)",
+    "plan": "print the stages, their reasons and their memory; run nothing",
     "workers": "share scans, members, shears and directions between N processes (default 0: this process)",
     "scheduler": "share them between the workers of this dask scheduler instead (tcp://host:8786); of many "
     "scans they need the files and the folder of the results",
@@ -114,22 +115,28 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     parser.add_argument("--version", action="version", version=f"fractalcontact {fc.__version__}")
     commands = parser.add_subparsers(required=True, dest="command", metavar="command")
 
-    run = commands.add_parser("run", help="run a scene: one NetCDF file, figures, a summary")
-    add = run.add_argument
-    add("scene", help="a scene file (TOML), or the name of a shipped scene")
-    add("-o", "--out", help=HELP["run folder"])
-    add("--plan", action="store_true", help="print the stages, their reasons and their memory; run nothing")
+    def command(name: str, action: Callable[..., int], line: str) -> argparse.ArgumentParser:
+        """Add a command and return its parser."""
+        added = commands.add_parser(name, help=line)
+        added.set_defaults(action=action)
+        return added
+
+    run = command("run", _run, "run a scene: one NetCDF file, figures, a summary")
+    run.add_argument("scene", help="a scene file (TOML), or the name of a shipped scene")
+    run.add_argument("-o", "--out", help=HELP["run folder"])
+    run.add_argument("--plan", action="store_true", help=HELP["plan"])
     _add_run_options(run)
-    run.set_defaults(action=_run)
 
     for question, line in QUESTIONS.items():
-        _add_question(commands, question, line)
+        asked = command(question, _answer, line)
+        asked.set_defaults(question=question, plan=False)
+        _add_question_options(asked, question)
+        _add_run_options(asked)
 
-    init = commands.add_parser("init", help="write a commented scene to start from")
+    init = command("init", _init, "write a commented scene to start from")
     init.add_argument("scene", nargs="?", default="scene.toml", help="the file to write (default scene.toml)")
-    init.set_defaults(action=_init)
 
-    accuracy = commands.add_parser("accuracy", help="measure error against run time on this machine")
+    accuracy = command("accuracy", _accuracy, "measure error against run time on this machine")
     accuracy.add_argument("names", nargs="*", metavar="NAME", help=HELP["benchmarks"])
     accuracy.add_argument("-o", "--out", help=HELP["accuracy folder"])
     accuracy.add_argument("--budget", type=float, help="time budget of benchmarks in seconds (default 60)")
@@ -140,28 +147,23 @@ def _parsers() -> tuple[argparse.ArgumentParser, Mapping[str, argparse.ArgumentP
     add("--methods", nargs="+", help="names from `fractalcontact methods` (default: all)")
     add("--members", type=int, nargs="+", help="surfaces for each case (default 25600 / size)")
     add("--seed", type=int, help="seed of the random stream")
-    accuracy.set_defaults(action=_accuracy)
 
-    methods = commands.add_parser("methods", help="list the estimators of fractal dimension")
-    methods.set_defaults(action=_methods)
+    command("methods", _methods, "list the estimators of fractal dimension")
 
-    report = commands.add_parser("report", help="write the report of a result file: one HTML file")
+    report = command("report", _report, "write the report of a result file: one HTML file")
     report.add_argument("file", help="a result file of `fractalcontact run`")
     report.add_argument("-o", "--out", help="the file to write (default: report.html beside the result)")
     report.add_argument("--csv", metavar="FOLDER", help="also write every curve there as a CSV file")
-    report.set_defaults(action=_report)
 
-    export = commands.add_parser("export", help="write the maps of a result file for ParaView or Fiji")
+    export = command("export", _export, "write the maps of a result file for ParaView or Fiji")
     add = export.add_argument
     add("file", help="a result file: heights, and the maps that [want] keep stores")
     add("--to", choices=("vti", "tiff"), default="vti", help="VTK image data (default) or stacks of TIFF")
     add("-o", "--out", help="folder for the files (default: maps beside the result)")
     add("--force", action="store_true", help="overwrite files of the same names")
-    export.set_defaults(action=_export)
 
-    info = commands.add_parser("info", help="show variables, achieved errors and run times of a result file")
+    info = command("info", _info, "show variables, achieved errors and run times of a result file")
     info.add_argument("file", help="a NetCDF file that this package wrote")
-    info.set_defaults(action=_info)
     return parser, commands.choices
 
 
@@ -196,9 +198,8 @@ def _or_refused(value: float | None, expected: str, text: str) -> float:
     return value
 
 
-def _add_question(commands: Any, question: str, line: str) -> None:
-    """Add a command that answers one question to a scan."""
-    command = commands.add_parser(question, help=line)
+def _add_question_options(command: argparse.ArgumentParser, question: str) -> None:
+    """Add what a command takes that answers one question to a scan."""
     add = command.add_argument
     if question == "joint":
         add("scans", nargs="+", metavar="LOWER UPPER", help=HELP["faces"])
@@ -217,8 +218,6 @@ def _add_question(commands: Any, question: str, line: str) -> None:
     add("--spacing", type=_metre, help=HELP["spacing"])
     add("-o", "--out", help=HELP["question folder"])
     add("--scene", action="store_true", help="print the scene and run nothing")
-    _add_run_options(command)
-    command.set_defaults(action=_answer, question=question, plan=False)
 
 
 def _answer(options: argparse.Namespace) -> int:
