@@ -76,8 +76,7 @@ def detrended(heights: Array, order: int, wraps: Sequence[bool] = ()) -> tuple[A
         values[~observed] = 0.0
     basis = _basis(heights.shape, order, wraps)
     gram = _gram(basis, observed)
-    singular = np.linalg.svd(gram, compute_uv=False)
-    if singular[-1] < RANK * singular[0]:
+    if gram is None:
         return heights, False
     for _ in range(2):  # the second pass removes the rounding error of the first
         right = np.array([_project(values, functions) for functions in basis])
@@ -108,8 +107,7 @@ def scaled_slopes(values: Array, spacing: Sequence[float], wraps: Sequence[bool]
         values = np.where(observed, values, 0.0)
     basis = _basis(values.shape, 1, wraps)
     gram = _gram(basis, observed)
-    singular = np.linalg.svd(gram, compute_uv=False)
-    if singular[-1] < RANK * singular[0]:
+    if gram is None:
         return (math.nan,) * values.ndim
     weights = np.linalg.solve(gram, np.array([_project(values, functions) for functions in basis]))
     # the basis is 1, then each axis that does not wrap in half-extents, x before y
@@ -131,8 +129,8 @@ def _basis(shape: tuple[int, ...], order: int, wraps: Sequence[bool]) -> list[tu
     return [tuple(axis[power] for axis, power in zip(axes, p, strict=True)) for p in chosen]
 
 
-def _gram(basis: list[tuple[Array, ...]], observed: Array) -> Array:
-    """Return the sums of products of the basis over the observed points."""
+def _gram(basis: list[tuple[Array, ...]], observed: Array) -> Array | None:
+    """Return the sums of products of the basis over the observed points; None if they are too few."""
     complete = bool(observed.all())
     weight = np.ones(1) if complete else observed.astype(np.float64)
     gram = np.empty((len(basis), len(basis)))
@@ -140,7 +138,8 @@ def _gram(basis: list[tuple[Array, ...]], observed: Array) -> Array:
         functions = tuple(a * b for a, b in zip(first, second, strict=True))
         total = math.prod(float(f.sum()) for f in functions) if complete else _project(weight, functions)
         gram[i, j] = gram[j, i] = total
-    return gram
+    singular = np.linalg.svd(gram, compute_uv=False)
+    return None if singular[-1] < RANK * singular[0] else gram
 
 
 def _project(values: Array, functions: tuple[Array, ...]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,6 +148,17 @@ def quantity_text(value: Any, units: str, digits: int = 3) -> str:
     """
     value = without_rounding(value, units)
     return scale_for(units, value).text(value, digits)
+
+
+def span(values: Any, text: Callable[[float], str]) -> str:
+    """Return the least and the greatest of some values as text, once where both read alike.
+
+    Examples
+    --------
+    >>> span([3.0, 1.0, 2.0], lambda value: f"{value:g}"), span([3.0, 3.1], lambda value: f"{value:.0f}")
+    ('1 to 3', '3')
+    """
+    return " to ".join(dict.fromkeys(text(float(end)) for end in (np.min(values), np.max(values))))
 
 
 def pascals(text: str) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.study import group_of
-from fractalcontact.base.units import number
+from fractalcontact.base.units import number, span
 from fractalcontact.scenes._result_tables import Column, at_value, finite, length, plain, share_of
 from fractalcontact.scenes._stage_type import ISLAND_MAP, StageType, stage_type
 
@@ -19,11 +19,9 @@ def _window(state: xr.Dataset) -> str | None:
     names = ("window_low", "window_high") if "window_low" in state else ("scale_min", "scale_max")
     if not set(names) <= set(state.variables) or not finite(state[names[0]]).size:
         return None
-    low, high = (finite(state[name]) for name in names)
-    if state[names[0]].attrs.get("units") == "m":
-        text = f"{length(low.min())} to {length(high.max())}"
-    else:
-        text = f"{number(low.min())} to {number(high.max())} cells"
+    ends = np.concatenate([finite(state[name]) for name in names])
+    is_length = state[names[0]].attrs.get("units") == "m"
+    text = span(ends, length) if is_length else f"{span(ends, number)} cells"
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 

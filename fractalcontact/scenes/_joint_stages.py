@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.study import MEMBER, end_of_first_leg
-from fractalcontact.base.units import STIFFNESSES, Scale, jrc_text, number, quantity_text, scale_for
+from fractalcontact.base.units import STIFFNESSES, Scale, jrc_text, number, quantity_text, scale_for, span
 from fractalcontact.scenes._result_tables import Column, amount, are_one, at_value, finite, length, plain
 from fractalcontact.scenes._scene import LOADS
 from fractalcontact.scenes._stage_type import CONTACT_MAPS, PARTIAL_SLIP, SLIP_MAPS, StageType, stage_type
@@ -36,10 +36,8 @@ def _jrc(state: xr.Dataset) -> Any:
 
 def _jrc_scatter(state: xr.Dataset) -> str:
     """Return the ends of the scatter of the profiles; words for those below the scale."""
-    low, high = (float(state[f"roughness_coefficient_{end}"].mean()) for end in ("low", "high"))
-    if not np.isfinite(low + high):
-        return "none"
-    return " to ".join(dict.fromkeys((jrc_text(low), jrc_text(high))))
+    ends = [float(state[f"roughness_coefficient_{end}"].mean()) for end in ("low", "high")]
+    return span(ends, jrc_text) if np.isfinite(ends).all() else "none"
 
 
 def _extreme(choose: Any, fewest: int) -> Any:
@@ -76,8 +74,8 @@ def _pressure_of_a_spring(_: xr.DataTree, test: xr.Dataset) -> Iterator[str]:
     """Yield the range of the pressure where it is that of a spring, which the dilatancy loads."""
     stress = test["normal_stress"]
     if float((stress.min("point") / stress.max("point")).min()) < 0.995:  # seen with three digits
-        low, high = (quantity_text(end, "Pa") for end in (finite(stress).min(), finite(stress).max()))
-        yield f"The nominal pressure is that at the start; the spring makes it {low} to {high} on the path."
+        ends = span(finite(stress), lambda end: quantity_text(end, "Pa"))
+        yield f"The nominal pressure is that at the start; the spring makes it {ends} on the path."
 
 
 def _mean_slope(state: xr.Dataset) -> str | None:
@@ -144,12 +142,9 @@ def _criteria(tree: xr.DataTree, _: xr.Dataset) -> Iterator[str]:
         row = data.sel(criterion=name)
         in_range = row["in_range"].any(set(row["in_range"].dims) - set(pressure.dims))  # of some member
         inside = finite(pressure.where(in_range))
-        ends = (
-            dict.fromkeys(quantity_text(end, "Pa") for end in (inside.min(), inside.max()))
-            if inside.size
-            else ()
-        )
-        where = f"in its range from {' to '.join(ends)}" if ends else "out of its range at every pressure"
+        where = "out of its range at every pressure"
+        if inside.size:
+            where = f"in its range from {span(inside, lambda end: quantity_text(end, 'Pa'))}"
         for text in dict.fromkeys(map(str, np.ravel(row["assumption"].values))):
             yield f"{name}: {text}; {where}" if text else f"{name}: {where}"
 
@@ -209,11 +204,8 @@ def _transmissivity(_: xr.DataTree, last: xr.Dataset) -> Iterator[str]:
     """Yield the transmissivity in m3, and for water in the unit of hydrogeology."""
     values = finite(last["transmissivity"])
     if values.any():
-        ends = (float(values.min()), float(values.max()))
         of_water = 998.2 * 9.81 / 1.002e-3  # 1/(m s): unit weight over viscosity, at 20 °C
-        cubes, water = (
-            " to ".join(dict.fromkeys(number(factor * end, 3) for end in ends)) for factor in (1.0, of_water)
-        )
+        cubes, water = (span(factor * values, number) for factor in (1.0, of_water))
         yield (
             f"transmissivity, the hydraulic aperture cubed over 12: {cubes} m³; times unit weight over "
             f"viscosity, for water at 20 °C, {water} m²/s"

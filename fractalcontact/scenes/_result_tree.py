@@ -18,6 +18,7 @@ import xarray as xr
 from fractalcontact.base import provenance, schema
 from fractalcontact.base.regression import is_far, random_effects
 from fractalcontact.base.study import MEMBER, NO_REFERENCES, group_of, joined_references, provenance_of
+from fractalcontact.base.units import span
 from fractalcontact.scenes._joint_stages import JRC_COLUMN
 from fractalcontact.scenes._result_tables import (
     FRACTIONS,
@@ -125,7 +126,7 @@ def _errors_by_method(estimates: xr.Dataset) -> Iterator[str]:
         errors = estimates["standard_error"].sel({"method": name}).values
         known = errors[np.isfinite(errors)]
         if known.size:
-            yield f"{name} {' to '.join(dict.fromkeys(f'{end:.4f}' for end in (known.min(), known.max())))}"
+            yield f"{name} {span(known, '{:.4f}'.format)}"
 
 
 OVERVIEW = "overview"  # group: a row for every scan

@@ -15,7 +15,7 @@ from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import STEEP
 from fractalcontact.base.study import group_of, member_count, of_member, scene_of
 from fractalcontact.base.tables import note, table
-from fractalcontact.base.units import number, quantity_text, without_rounding
+from fractalcontact.base.units import number, quantity_text, span, without_rounding
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.scenes._result_tables import ResultTable, length, share_of, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
@@ -377,7 +377,7 @@ def _tilt(tree: xr.DataTree) -> Iterator[str]:
     tilted = shares[shares > 0.5]
     if tilted.size and group_of(tree, "contact") is not None:  # the flat touches one edge
         where = f" in {tilted.size} of {shares.size} members" if shares.size > 1 else ""
-        carried = " to ".join(dict.fromkeys(f"{100 * end:.0f}" for end in (tilted.min(), tilted.max())))
+        carried = span(tilted, lambda share: f"{100 * share:.0f}")
         yield (
             f"the surface is tilted{where}: its mean plane carries {carried} % of Sq², so that the flat "
             "touches one edge first, and area and closure are those of a wedge. Remedy: level = 1."
@@ -433,9 +433,8 @@ def _resolution(_: xr.DataTree, path: str, pressed: xr.Dataset, least: int = 30)
         return
     low, high = (np.atleast_1d(getattr(unresolved, end)(others).values) for end in ("min", "max"))
     greatest = int(np.flatnonzero(np.isfinite(low))[-1])
-    ends = dict.fromkeys(number(float(end[greatest]), 2) for end in (low, high))
-    cell = "cell" if list(ends) == ["1"] else "cells"
-    sizes = f"{' to '.join(ends)} {cell}"
+    sizes = span((low[greatest], high[greatest]), lambda size: number(size, 2))
+    sizes += " cell" if sizes == "1" else " cells"
     sizes = f"median island {sizes}" if "state" in pressed else f"{sizes} an island, from their perimeter"
     where = f"in {few} of {all_states} states" if others else f"at {few} of {all_states} loads"
     where = "at any load" if few == all_states else where
