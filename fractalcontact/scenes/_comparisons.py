@@ -13,7 +13,7 @@ import xarray as xr
 from fractalcontact.base.compass import direction_text
 from fractalcontact.base.study import group_of, provenance_of
 from fractalcontact.base.units import fixed, jrc_text
-from fractalcontact.scenes._result_tables import length
+from fractalcontact.scenes._result_tables import finite, length
 from fractalcontact.scenes._stage_type import public_function
 from fractalcontact.scenes._summary import aperture_as_placed, scene_table
 
@@ -93,8 +93,7 @@ def _energy_form(tree: xr.DataTree) -> str:
         form="energy",
         distance=float(friction["peak_distance"].max()),
     )["peak_friction_angle"]
-    more, locked = (angle - friction["peak_friction_angle"]).values, int((known & angle.isnull()).sum())
-    more = more[np.isfinite(more)]
+    more, locked = finite(angle - friction["peak_friction_angle"]), int((known & angle.isnull()).sum())
     found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
     found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
     return " and ".join(found)

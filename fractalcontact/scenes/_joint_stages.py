@@ -184,8 +184,8 @@ def _outside_criterion(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield under which pressures a shear curve is outside the range of its criterion."""
     is_outside = ~data["in_range"].astype(bool)
     dims = [dim for dim in is_outside.dims if dim != "nominal_pressure"]
-    outside = np.atleast_1d(data["nominal_pressure"].where(is_outside.any(dims)).values)
-    pressures = [quantity_text(value, "Pa") for value in outside[np.isfinite(outside)]]
+    outside = finite(data["nominal_pressure"].where(is_outside.any(dims)))
+    pressures = [quantity_text(value, "Pa") for value in outside]
     if pressures:
         yield f"shear curve: outside the range of its criterion at {', '.join(pressures)}"
 

@@ -241,7 +241,7 @@ def share_of(count: int, size: int) -> str:
     return f" ({count} of {size})" if count < size else ""
 
 
-def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
+def amount(data: Any, scale: Scale | None = None) -> str:
     """Return a value with its unit and SI prefix; of an ensemble mean and standard deviation.
 
     `scale` is that of a column, see `column_scale`.
@@ -254,7 +254,7 @@ def amount(data: Any, digits: int = 3, scale: Scale | None = None) -> str:
     elif scale is None:
         scale = scale_for(units, float(known.mean()) if known.size else np.nan)
     unit = f" {scale.unit}".rstrip()
-    return _over_members(scale(values), lambda value: number(value, digits), _decimals_of, unit)
+    return _over_members(scale(values), number, _decimals_of, unit)
 
 
 def column_scale(data: Any) -> Scale | None:

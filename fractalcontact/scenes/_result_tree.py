@@ -28,6 +28,7 @@ from fractalcontact.scenes._result_tables import (
     Rows,
     cell,
     column_scale,
+    finite,
     table_of,
 )
 from fractalcontact.scenes._scene import Scene
@@ -123,8 +124,7 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
 def _errors_by_method(estimates: xr.Dataset) -> Iterator[str]:
     """Yield each method with its standard error; with the ends over the members of an ensemble."""
     for name in estimates["method"].values:
-        errors = estimates["standard_error"].sel({"method": name}).values
-        known = errors[np.isfinite(errors)]
+        known = finite(estimates["standard_error"].sel({"method": name}))
         if known.size:
             yield f"{name} {span(known, '{:.4f}'.format)}"
 

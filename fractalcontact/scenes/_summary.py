@@ -17,7 +17,7 @@ from fractalcontact.base.study import group_of, member_count, of_member, scene_o
 from fractalcontact.base.tables import note, table
 from fractalcontact.base.units import number, quantity_text, span, without_rounding
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.scenes._result_tables import ResultTable, length, share_of, table_of
+from fractalcontact.scenes._result_tables import ResultTable, finite, length, share_of, table_of
 from fractalcontact.scenes._result_tree import OVERVIEW, scan_facts, scan_tables
 from fractalcontact.scenes._stages import STAGES
 
@@ -488,8 +488,7 @@ def _strength(tree: xr.DataTree) -> Iterator[str]:
     limits = scene_table(tree, "material").get("yield_pressure")
     if friction is None or limits is None or "peak_shear_strength" not in friction:
         return
-    strengths = np.ravel(friction["peak_shear_strength"].values)
-    strengths = strengths[np.isfinite(strengths)]
+    strengths = finite(friction["peak_shear_strength"])
     if strengths.size and strengths.max() > np.min(limits):
         strength, limit = (quantity_text(value, "Pa") for value in (strengths.max(), np.min(limits)))
         yield (
