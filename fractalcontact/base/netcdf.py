@@ -188,7 +188,9 @@ def open(path: str | os.PathLike[str], *, chunks: Any = None) -> Any:
     except Exception as error:
         raise UnreadableFile(where, [f"path: {source.name!r} {files.DAMAGED}"]) from error
     for node in tree.subtree:
-        node.dataset = _as_saved(node.to_dataset(inherit=False))
+        # with the types, encoding and indexes that it had when it was written
+        saved = encoded(_with_fixed_width_strings(node.to_dataset(inherit=False)))
+        node.dataset = with_load_indexes(saved)
     saved_type = tree.attrs.get(_TYPE, "DataTree" if tree.children else "Dataset")
     if saved_type == "DataTree":
         return tree
@@ -330,11 +332,6 @@ def _failure_reason(folder: Path, error: Exception) -> str:
             return "no space left on the device"
     reason = getattr(error, "strerror", None) or str(error)
     return reason if isinstance(error, OSError) else f"the file could not be completed ({reason})"
-
-
-def _as_saved(dataset: xr.Dataset) -> xr.Dataset:
-    """Return what was read with the types, encoding and indexes that it had when it was written."""
-    return with_load_indexes(encoded(_with_fixed_width_strings(dataset)))
 
 
 def _with_fixed_width_strings(dataset: xr.Dataset) -> xr.Dataset:

@@ -177,15 +177,6 @@ def require_memory(where: str, needed: float, what: str) -> None:
         raise TooLittleMemory.of(where, "memory", expected, f"{what}: about {in_words(needed)}")
 
 
-def peak_of(estimate: Estimate, arguments: Mapping[str, Any], *, in_blocks: bool = False) -> float:
-    """Return the bytes that a call takes at its peak beyond its arguments; these have passed their check.
-
-    A dask array that is read in blocks does not count.
-    """
-    plane = None if in_blocks and loaded_bytes(arguments) else plane_in(arguments)
-    return bytes_on(estimate, plane or Plane((0, 0)), arguments)
-
-
 def has_blocks(value: Any) -> bool:
     """Return whether a value is a labelled array of dask, or of another kind in blocks.
 

@@ -39,9 +39,10 @@ from fractalcontact.base.numbers import python_number
 from fractalcontact.base.provenance import stamp, with_load_indexes
 from fractalcontact.base.resources import (
     Estimate,
+    Plane,
+    bytes_on,
     has_blocks,
     loaded_bytes,
-    peak_of,
     plane_in,
     require_memory,
 )
@@ -148,11 +149,14 @@ def public_result(
             bound.apply_defaults()
             done = usual_arguments(name, bound.arguments, spacing)
             bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
-            if not in_blocks and (loaded := loaded_bytes(bound.arguments)):
+            loaded = loaded_bytes(bound.arguments)
+            if loaded and not in_blocks:
                 require_memory(name, loaded, _size_of(bound.arguments))
             with Problems(name, error, bound.arguments) as problems:
                 checked_values = None if check is None else check(problems)
-            needed = peak_of(memory, bound.arguments, in_blocks=in_blocks)
+            # a dask array that is read in blocks does not count
+            plane = None if in_blocks and loaded else plane_in(bound.arguments)
+            needed = bytes_on(memory, plane or Plane((0, 0)), bound.arguments)  # beyond its arguments
             require_memory(name, needed, _size_of(bound.arguments))
             return bound, done, checked_values
 

@@ -173,7 +173,7 @@ def plan(scene: Scene) -> Plan:
     with Problems("fractalcontact.scenes.plan") as problems:
         problems.require(isinstance(scene, Scene), "scene", "a Scene, from fractalcontact.scenes.load", scene)
     stages = stages_of(scene)
-    return Plan(scene.name, stages, stage_memory(scene, stages))
+    return Plan(scene.name, stages, _with_members(scene, stages, *_member_memory(scene, stages)))
 
 
 def stages_of(scene: Scene) -> tuple[Stage, ...]:
@@ -262,11 +262,6 @@ KERNELS = {"dimensions": 5.0e7, "contact": 6.0e7, "joints": 6.0e7, "domains": 2.
 PERIODIC = ("spectral", "weierstrass")  # generators of periodic surfaces
 
 
-def stage_memory(scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None = None) -> dict[str, float]:
-    """Return the peak memory of each stage in bytes; nothing where the surface cannot be made or read."""
-    return _with_members(scene, stages, *_member_memory(scene, stages, face))
-
-
 def _with_members(
     scene: Scene, stages: Sequence[Stage], peaks: Mapping[str, float], stored: Mapping[str, float]
 ) -> dict[str, float]:
@@ -286,9 +281,12 @@ def _with_members(
 
 
 def _member_memory(
-    scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None
+    scene: Scene, stages: Sequence[Stage], face: xr.DataArray | None = None
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the peak memory of each stage for one surface, and the bytes of the maps that the result has."""
+    """Return the peak memory of each stage for one surface, and the bytes of the maps that the result has.
+
+    Both in bytes; nothing where the surface cannot be made or read.
+    """
     generator = scene.surface.generate
     if generator is not None and not arguments_of(f"surfaces.{generator}")[1] <= set(scene.surface.options):
         return {}, {}

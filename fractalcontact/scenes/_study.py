@@ -231,14 +231,6 @@ class Study:
             raise error
         self.failures[name] = reason_of(error)
 
-    def _load_kept(self, name: str, count: int) -> None:
-        """Load the parts of a stage that an earlier run kept."""
-        parts = self.parts.setdefault(name, {})
-        for number in range(count):
-            kept = None if number in parts else self.store.get(self._key(name, number))
-            if kept is not None:
-                parts[number] = kept
-
     def _tasks(self, stage: Stage) -> dict[tuple[str, int], _PartTask]:
         """Return the missing parts of a stage, each with the stages that follow it."""
         work = self.works[stage.name]
@@ -247,15 +239,18 @@ class Study:
         functions = tuple(_parts.reader_of(reader, self.scene, self.results) for reader in readers)
         names = (stage.name, *(reader.name for reader in readers))
         for name in names:
-            self._load_kept(name, len(work.parts))
+            parts = self.parts.setdefault(name, {})
+            for number in set(range(len(work.parts))) - set(parts):
+                if (kept := self.store.get(self._key(name, number))) is not None:
+                    parts[number] = kept
         kept_names = () if _is_fast_to_repeat(stage, self.scene) else names
         tasks = {}
         for number, part in enumerate(work.parts):
             if all(number in self.parts[name] for name in names):
                 continue
-            kept = self.parts[stage.name].get(number)
-            if kept is not None and all(name in kept for name in stage.keep):
-                part = kept.copy  # computed by an earlier run
+            done = self.parts[stage.name].get(number)
+            if done is not None and all(name in done for name in stage.keep):
+                part = done.copy  # computed by an earlier run
             keys = tuple(self._key(name, number) for name in kept_names)
             tasks[stage.name, number] = _PartTask((part, *functions), stage.dropped, names, keys)
         return tasks
