@@ -96,6 +96,12 @@ def test_each_problem_is_named(write, old, new, word):
         fc.scenes.load(write(SOUND.replace(old, new)))
 
 
+def test_a_stage_with_a_row_for_each_direction_takes_several(write):
+    scene = SOUND.replace('direction = "W"', 'direction = ["W", "E"]')
+    scene = scene.replace('["closure", "rigid_dilatancy"]', '["decorrelation_length", "rigid_dilatancy"]')
+    assert fc.scenes.load(write(scene)).table("joint")["direction"] == ["W", "E"]
+
+
 def test_unreadable_scene_is_refused(write, tmp_path):
     with pytest.raises(UnreadableFile, match="not a TOML file"):
         fc.scenes.load(write("[surface"))
