@@ -300,6 +300,7 @@ _NAMES: dict[str, tuple[str, ...]] = {
         *("covering_area", "cube_count", "roughness", "madogram", "variogram", "second_variogram"),
         *("variation", "fluctuation", "divider_length", "higuchi_length"),
     ),
+    "NaN where nothing was observed": ("coverage", "box_measure"),
     "NaN where the set is empty": (
         *("total_perimeter", "largest_island", "mean_island_area", "largest_length", "mean_island_length"),
     ),

@@ -50,7 +50,7 @@ class RandomCells:
         pair of boxes.
         """
         # of boxes that are apart, q(a + b) - q(a) q(b) is about -a q(a) b q(b) times this
-        self.coupling = cells / (observed * max(observed - cells, 1.0))
+        self.coupling = cells / max(observed * (observed - cells), observed, 1.0)
         # ln q(m) <= -k m / A, so that further values are below `LEAST_LOG`
         count = np.ceil(min(largest, observed, -LEAST_LOG * observed / max(cells, 1.0)))
         left = observed - np.arange(count)

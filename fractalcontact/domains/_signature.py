@@ -256,10 +256,9 @@ class RandomSpots:
         """
         dy, dx = grid.spacing
         sides = 2.0 * (1.0 - self.coverage) * (self.along_y / dy + self.along_x / dx)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(
-                np.where(self.coverage > 0, 4.0 * self.coverage / (np.pi / 4.0 * sides), np.nan)
-            )
+        # NaN of a full set, and where nothing was observed beside the cells of the set
+        perimeter = np.where(sides > 0, np.pi / 4.0 * sides, np.nan)
+        return np.asarray(np.where(self.coverage > 0, 4.0 * self.coverage / perimeter, np.nan))
 
 
 def _window_quantities(

@@ -92,6 +92,19 @@ def test_unobserved_cells_make_no_difference(name, mask):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
+@pytest.mark.parametrize("share", [0.0, 0.1])
+def test_few_observed_cells_give_no_infinity_and_reasons(name, share):
+    cells = np.zeros((2, 12, 12), bool)
+    cells[1, 4, 4] = True
+    valid = as_mask((np.random.default_rng(3).random((12, 12)) < share) | (share > 0) * cells[1])
+    result = FUNCTIONS[name](as_mask(cells, dims=("step", "y", "x")), valid=valid)
+    for variable in result.data_vars.values():
+        if variable.dtype.kind == "f" and not np.isfinite(variable.values).all():
+            assert not np.isinf(variable.values).any()
+            assert "reason" in variable.attrs or "NaN" in variable.attrs["comment"]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
 def test_valid_must_match_the_mask(name, mask):
     for invalid in (mask.isel(step=0).astype(int), mask.isel(step=0, x=slice(3)), np.ones((32, 32))):
         with pytest.raises(ValueError, match="valid: expected"):
