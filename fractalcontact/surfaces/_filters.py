@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from fractalcontact.base.grid import core_dims, read_grid
-from fractalcontact.base.numbers import Array, is_within
+from fractalcontact.base.numbers import ROUNDED, Array, is_within
 from fractalcontact.base.regression import detrended, rounding_of
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems, require
@@ -153,7 +153,8 @@ def weighted_mean(heights: Array, cutoff: float, spacing: Sequence[float], perio
         # in points; of a periodic axis a cutoff of five periods leaves the mean, and 3e-8 of the longest wave
         length = min(cutoff / step, 5.0 * n) if wraps else cutoff / step
         deviation = math.sqrt(math.log(2.0) / 2.0) / math.pi * length  # a cutoff/sqrt(2 pi), a^2 = ln 2/pi
-        reach = int(length if wraps else min(length, n))  # the weights have fallen to 1e-6 there
+        # the weights have fallen to 1e-6 there
+        reach = int((length if wraps else min(length, n)) * ROUNDED)
         weights = np.exp(-0.5 * np.square(np.arange(-reach, reach + 1) / deviation))
         weights /= weights.sum()
         mode = "wrap" if wraps else "constant"

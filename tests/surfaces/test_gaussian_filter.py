@@ -65,6 +65,15 @@ def test_weights_at_an_edge_and_beside_a_gap():
     assert int(filtered.isnull().sum()) == 1
 
 
+@pytest.mark.parametrize("spacing", [7e-6, 1.1e-4, 1.7e-3])
+def test_a_cutoff_of_whole_spacings_does_not_depend_on_the_unit(spacing):
+    """The last weight, at one cutoff, counts whichever way 5 spacings are rounded."""
+    heights = np.random.default_rng(4).standard_normal((20, 23))
+    expected = fc.surfaces.gaussian_filter(surface_of(heights, 1.0), 5.0)
+    filtered = fc.surfaces.gaussian_filter(surface_of(heights, spacing), 5 * spacing)
+    np.testing.assert_allclose(filtered, expected, rtol=0, atol=1e-12)
+
+
 def test_constant_profile_stays():
     filtered = fc.surfaces.gaussian_filter(surface_of(np.full(40, 3.0)), CUTOFF)
     np.testing.assert_allclose(filtered, 3.0, rtol=1e-15)
