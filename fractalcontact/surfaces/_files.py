@@ -117,6 +117,16 @@ class Request:
         return file_suffix(self.path)
 
 
+def array_name(names: Sequence[str], request: Request, kind: str) -> str:
+    """Return the name of the only array, of that called `channel` or with its number, or `height`."""
+    channel, default = request.channel, names[0] if len(names) == 1 else "height"
+    name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
+    expected = f"one of {', '.join(map(repr, names))}" if names else kind
+    got = NONE if channel is None else channel
+    require_readable(name in names, "channel", f"{expected} in {request.path.name!r}", got)
+    return str(name)
+
+
 class NotATable(ValueError):
     """A text is not a table of numbers; the message names the line and the column."""
 

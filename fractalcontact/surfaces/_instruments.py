@@ -52,7 +52,7 @@ def read_instrument(request: Request) -> xr.DataArray:
     with NETCDF_LOCK, _quiet() as messages, _files.open_bytes(path) as file:
         _files.check_unpacked(path.name, file)
         reader, other_unit = _open(file, path)
-        chosen = _channel(reader, request.channel, path.name)
+        chosen = _channel(reader, request)
         name = str(reader.format())
         size, fallback = chosen.physical_sizes, units or ("m" if name in ARRAYS else None)
         lateral, vertical = chosen.unit if isinstance(chosen.unit, tuple) else (chosen.unit, chosen.unit)
@@ -114,12 +114,16 @@ def _open(file: Any, path: Path) -> tuple[Any, str | None]:
     raise UnreadableFile("", [f"path: {path.name!r} is {UNKNOWN} ({reason})"])
 
 
-def _channel(reader: Any, channel: str | int | None, name: str) -> Any:
-    """Return a channel by name or number; None stands for the default of the format."""
-    with _files.corrupt_named(name):
+def _channel(reader: Any, request: Request) -> Any:
+    """Return a channel by name or number; None stands for the default of the format, of arrays `height`."""
+    channel = request.channel
+    with _files.corrupt_named(request.path.name):
         channels = list(reader.channels)
-        if channel is None:
+        if channel is None and reader.format() not in ARRAYS:
             return reader.default_channel
+    if reader.format() in ARRAYS:  # beside the heights there may be numbers, and coordinates in a row
+        channels = [entry for entry in channels if min(entry.nb_grid_pts) > 1]
+        channel = _files.array_name([str(entry.name) for entry in channels], request, "an array of heights")
     names = [str(entry.name) for entry in channels]
     if isinstance(channel, str) and channel in names:
         return channels[names.index(channel)]

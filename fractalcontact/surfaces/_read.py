@@ -24,7 +24,7 @@ from fractalcontact.base.study import provenance_of
 from fractalcontact.base.units import UNITS, in_metres
 from fractalcontact.base.validation import NONE, Problems, Words, reading
 from fractalcontact.surfaces import _files, _read_points
-from fractalcontact.surfaces._files import EmptyTable, NotATable, Request, require_readable
+from fractalcontact.surfaces._files import EmptyTable, NotATable, Request, array_name, require_readable
 from fractalcontact.surfaces._fit_plane import check_frame
 from fractalcontact.surfaces._from_array import axis_spacing, check_heights, check_spacing, labelled_heights
 from fractalcontact.surfaces._instruments import PLAIN, UNKNOWN, from_bottom, read_instrument, read_raster
@@ -88,7 +88,8 @@ def read(
         `from_points`.
     channel : str or int, optional
         Channel of an instrument's file or band of a raster (by its number, from 0), variable of a NetCDF
-        file, or array of an `.npz` file. Default: the first height channel, `height`, or the only one.
+        file, or array of an `.npz`, `.mat` or `.h5` file. Default: the first height channel, `height`, or the
+        only one.
     units : str, optional
         Unit of the heights, and of all coordinates of points: "m", "mm", "um", "nm" ... Default: that of the
         file; metres for tables, points, rasters and arrays without one. A unit other than that of the file
@@ -143,6 +144,8 @@ def read(
         for name, value in {"columns": columns, "plane": plane}.items():
             is_used = value is None or "gridding" in surface.attrs
             require_readable(is_used, name, f"None for heights, as those of {source.name!r}", value)
+        sizes = [surface.sizes[dim] for dim in core_dims(surface)]
+        require_readable(min(sizes) > 1, "path", "at least 2 points along each axis", sizes)
         digest = file_checksum(source)
     stated = surface.attrs["stated_unit"]
     if units is not None and stated in UNITS and in_metres(1.0, units) != in_metres(1.0, stated):
@@ -195,7 +198,7 @@ def _text_content(request: Request) -> xr.DataArray:
         is_points = request.columns is not None or request.suffix in _read_points.ALWAYS_POINTS
         if not (is_points or isinstance(error, EmptyTable)):
             if request.spacing is None:
-                return _instrument_or_table(request)
+                return _instrument_or_table(request, str(error))
             if (surface := _headed_content(request)) is not None:
                 return surface
         fault = f"is not a table of numbers ({error})"
@@ -211,7 +214,7 @@ def _text_content(request: Request) -> xr.DataArray:
     is_tall = number < 12 and rows > 20 * number  # as a list of points is, not a map
     require_readable(not is_tall, "path", expected, f"{rows} rows of {number} columns")
     if request.spacing is None:
-        return _instrument_or_table(request, is_table=True)
+        return _instrument_or_table(request)
     if table.comment and (surface := _headed_content(request)) is not None:
         return surface
     expected = "a grid of heights, one row to a line"
@@ -238,13 +241,17 @@ def _headed_content(request: Request) -> xr.DataArray | None:
     return None
 
 
-def _instrument_or_table(request: Request, *, is_table: bool = False) -> xr.DataArray:
-    """Read text that no spacing makes a table of heights as the file of an instrument."""
+def _instrument_or_table(request: Request, fault: str = "") -> xr.DataArray:
+    """Read text without a spacing as the file of an instrument; with a fault it is no table of numbers."""
     try:
         return read_instrument(request)
     except (MissingExtra, UnreadableFile) as error:
-        if isinstance(error, UnreadableFile) and not (is_table and UNKNOWN in str(error)):
-            raise
+        if isinstance(error, UnreadableFile):
+            if UNKNOWN not in str(error):
+                raise
+            if fault:
+                problem = f"{error.problems[0]}, and is not a table of numbers ({fault})"
+                raise UnreadableFile("", [problem]) from error
         expected = f"{SPACING_NEEDED}, for {request.path.name!r} as a table of heights"
         raise UnreadableFile("", [f"spacing: expected {expected}, got None"]) from None
 
@@ -282,7 +289,7 @@ def _archive_content(request: Request) -> xr.DataArray:
     heights = {
         key: array for key, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)
     }
-    name = _channel(list(heights), request, "an array of heights")
+    name = array_name(list(heights), request, "an array of heights")
     values = heights[name]
     axes = [arrays.get(dim, np.empty(0)) for dim in ("y", "x")]
     axes = [axis.ravel().astype(np.float64) if axis.dtype.kind in "iuf" else np.empty(0) for axis in axes]
@@ -299,15 +306,6 @@ def _archive_content(request: Request) -> xr.DataArray:
     expected = f"dims (y, x), as of the arrays y and x {tuple(stated)}"
     require_readable(spacing is not None or stated != shape[::-1], name, expected, tuple(shape))
     return _array_content(values, request)
-
-
-def _channel(names: Sequence[str], request: Request, kind: str) -> str:
-    """Return the name of the only array, of that called `channel` or with its number, or `height`."""
-    channel, default = request.channel, names[0] if len(names) == 1 else "height"
-    name = names[channel] if isinstance(channel, int) and 0 <= channel < len(names) else channel or default
-    expected = f"one of {', '.join(map(repr, names))}" if names else kind
-    require_readable(name in names, "channel", f"{expected} in {request.path.name!r}", name)
-    return str(name)
 
 
 def _array_content(values: Array, request: Request) -> xr.DataArray:
@@ -338,7 +336,7 @@ def _netcdf_content(request: Request) -> xr.DataArray:
     """Read `height` of a NetCDF file, or the variable `channel`, with dims (..., y, x)."""
     spacing = request.spacing
     candidates = _height_variables(netcdf.open(request.path))
-    name = _channel(list(candidates), request, "a variable with dims (y, x)")
+    name = array_name(list(candidates), request, "a variable with dims (y, x)")
     array = candidates[name]
     stated = array.attrs.get("units")
     unit = request.units or stated

@@ -102,8 +102,16 @@ def test_one_wrong_row_is_found_quickly(tmp_path, monkeypatch, header, spacing):
     with pytest.raises(UnreadableFile) as caught:
         fc.surfaces.read(tmp_path / "a.csv", spacing=spacing)
     assert tried == []
-    if spacing is not None and not header.startswith("height"):
+    if not header.startswith("height"):
         assert "column 1: expected a number, got 'O.5'" in str(caught.value)
+
+
+def test_text_in_another_encoding_is_called_no_table(tmp_path):
+    """Spreadsheets write the micro sign as one byte, and no reader of instruments knows such a file."""
+    pytest.importorskip("SurfaceTopography")
+    (tmp_path / "a.csv").write_bytes("x [µm];y [µm];z [µm]\n0;0;1\n1;0;2\n0;1;3\n1;1;4\n".encode("latin-1"))
+    with pytest.raises(UnreadableFile, match=r"not a table of numbers \(it is not text: byte 3 is not UTF-8"):
+        fc.surfaces.read(tmp_path / "a.csv")
 
 
 def packed(path):
@@ -586,6 +594,41 @@ def test_inches_are_a_unit_of_length(tmp_path):
     for unit in ("inch", "in"):
         read = fc.surfaces.read(tmp_path / "scan.npy", spacing=1e-3, units=unit)
         np.testing.assert_allclose(read.values[1], 25.4e-6 * np.arange(4.0, 8.0), rtol=1e-14)
+
+
+def write_arrays(path, arrays):
+    """Write arrays by name in the format of the path."""
+    if path.suffix == ".mat":
+        pytest.importorskip("SurfaceTopography")
+        scipy.io.savemat(path, arrays)
+    elif path.suffix == ".h5":
+        pytest.importorskip("SurfaceTopography")
+        with pytest.importorskip("h5py").File(path, "w") as file:
+            file.update(arrays)
+    else:
+        np.savez(path, **arrays)
+
+
+@pytest.mark.parametrize("suffix", [".mat", ".h5", ".npz"])
+def test_heights_among_other_arrays(tmp_path, suffix):
+    """The first array may be a step, or a coordinate at each cell."""
+    path, heights = tmp_path / f"a{suffix}", np.random.default_rng(1).random((4, 6))
+    write_arrays(path, {"dx": 0.1, "t": np.arange(6.0), "z": heights})
+    np.testing.assert_array_equal(fc.surfaces.read(path, spacing=1.0), heights)
+    y, x = np.indices(heights.shape, float)
+    write_arrays(path, {"X": x, "Y": y, "Z": heights})
+    with pytest.raises(UnreadableFile, match="channel: expected one of 'X', 'Y', 'Z' in .*, got none"):
+        fc.surfaces.read(path, spacing=1.0)
+    np.testing.assert_array_equal(fc.surfaces.read(path, spacing=1.0, channel="Z"), heights)
+    write_arrays(path, {"X": x, "Y": y, "height": heights})
+    np.testing.assert_array_equal(fc.surfaces.read(path, spacing=1.0), heights)
+
+
+def test_raster_of_one_row_is_refused(tmp_path):
+    pytest.importorskip("rasterio")
+    (tmp_path / "a.asc").write_text("ncols 4\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3 4\n")
+    with pytest.raises(UnreadableFile, match=r"at least 2 points along each axis, got \[1, 4\]"):
+        fc.surfaces.read(tmp_path / "a.asc")
 
 
 @pytest.mark.parametrize("has_library", [True, False])
