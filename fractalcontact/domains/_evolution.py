@@ -156,7 +156,7 @@ def _labelled_rows(planes: Planes, rows: Array, comments: dict[str, str]) -> xr.
 
 def _change(planes: Planes, components: Sequence[Components], path: Path, k: int) -> list[float]:
     """Return the `CHANGES` of the plane k from the one before it."""
-    before, after = planes.cells[path.before[k]], path.moved(planes.cells[k], k)
+    before, after = path.facing(planes.cells[path.before[k]], planes.cells[k], k)
     events = path.overlaps(components, k).event_counts
     overlap, chance = area_overlap(before, after), _chance_overlap(*planes.coverage[[path.before[k], k]])
     beyond = (overlap - chance) / (1.0 - chance) if chance < 1.0 else np.nan
@@ -288,7 +288,7 @@ def lineage(
         The leading dim that is the path; by default the last.
     frame : {"upper", "middle", "lower"}
         Along `shear`: compare places on the block, which is the frame of the mask, on the lower face, or half
-        way between them, to whole cells.
+        way between them, to whole cells; only those that both states cover.
     connectivity : {1, 2}
         1 joins cells that share a side (4 neighbours), 2 also those that share a corner (8 neighbours).
     periodic : bool, optional
@@ -328,10 +328,9 @@ def lineage(
     path = Path.of(planes, along, frame)
     later = np.flatnonzero(path.before >= 0).tolist()
     tables = [event_table(path.overlaps(components, k)) for k in later]
-    empty = {
-        name: values[:0]
-        for name, values in event_table(island_overlaps(components[0], components[0])).items()
-    }
+    first = components[0]
+    of_itself = event_table(island_overlaps(first, first, first.map, first.map))
+    empty = {name: values[:0] for name, values in of_itself.items()}
     columns = {name: np.concatenate([empty[name], *(table[name] for table in tables)]) for name in empty}
     rows = np.repeat(np.array(later, np.int64), [table["event"].size for table in tables])
     variables = {name: ("link", values) for name, values in columns.items()}
@@ -372,18 +371,23 @@ class Path:
 
     def overlaps(self, components: Sequence[Components], k: int) -> Overlaps:
         """Return which islands of the state before the plane k share cells with those of k, in one frame."""
-        return island_overlaps(components[self.before[k]], components[k], self.moved(components[k].map, k))
+        before, after = components[self.before[k]], components[k]
+        return island_overlaps(before, after, *self.facing(before.map, after.map, k))
 
-    def moved(self, plane: Array, k: int) -> Array:
-        """Return a map of the state k in the frame of the one before; empty where a free edge moves in."""
-        for axis, (cells, wraps) in enumerate(zip(self.offsets[k].tolist(), self.periodic, strict=True)):
-            if cells == 0:
+    def facing(self, before: Array, after: Array, k: int) -> tuple[Array, Array]:
+        """Return maps of the state before and of the state k at the same places of their frame.
+
+        Along a free axis these are the places that both states cover, as far as the block has not left them.
+        """
+        of_before, of_after = [slice(None)] * 2, [slice(None)] * 2
+        for axis, (offset, wraps) in enumerate(zip(self.offsets[k].tolist(), self.periodic, strict=True)):
+            if wraps:
+                after = np.roll(after, offset, axis)
                 continue
-            plane = np.roll(plane, cells, axis)
-            if not wraps:
-                lines = np.moveaxis(plane, axis, 0)
-                lines[slice(None, cells) if cells > 0 else slice(cells, None)] = 0
-        return plane
+            n = after.shape[axis]
+            ahead, behind = min(max(offset, 0), n), min(max(-offset, 0), n)
+            of_before[axis], of_after[axis] = slice(ahead, n - behind), slice(behind, n - ahead)
+        return before[tuple(of_before)], after[tuple(of_after)]
 
 
 @dataclass(frozen=True)
@@ -415,9 +419,8 @@ class Overlaps:
         }
 
 
-def island_overlaps(before: Components, after: Components, moved: Array | None = None) -> Overlaps:
-    """Return which islands of two states share cells; `moved` is the later map in another frame."""
-    old, new = before.map, after.map if moved is None else moved
+def island_overlaps(before: Components, after: Components, old: Array, new: Array) -> Overlaps:
+    """Return which islands of two states share cells; `old` and `new` are their maps in one frame."""
     before_count, after_count = before.count, after.count
     both = (old > 0) & (new > 0)
     codes = old[both].astype(np.int64) * (after_count + 1) + new[both]

@@ -219,6 +219,24 @@ def test_frames_follow_either_face(direction, step, wraps):
         fc.domains.evolution(mask.drop_vars("shear"), frame="lower")
 
 
+@pytest.mark.parametrize(("direction", "step"), [("E", (0, 4)), ("S", (-4, 0)), ("NE", (3, 3))])
+def test_what_moves_in_or_out_at_a_free_edge_is_no_change(direction, step):
+    face = level_set(64, 0.7, 0.3, np.random.default_rng(2))
+    blocks = [face[8 + k * step[0] :, 8 + k * step[1] :][:40, :45] for k in range(3)]
+    travel = 4e-3 if direction != "NE" else 3e-3 * np.sqrt(2)
+    mask = as_mask(blocks, dims=("shear", "y", "x"))
+    mask = mask.assign_coords(shear=travel * np.arange(3), direction=direction)
+    result = fc.domains.evolution(mask, frame="lower")
+    np.testing.assert_array_equal(result.overlap[1:], 1.0)
+    np.testing.assert_array_equal(result.hausdorff_distance[1:], 0.0)
+    mask[1] = face[:40, :45]  # another set: the same numbers on the way back
+    result, back = (fc.domains.evolution(way, frame="lower") for way in (mask, mask.isel(shear=[2, 1, 0])))
+    for name in ("overlap", "hausdorff_distance"):
+        np.testing.assert_array_equal(result[name][1:], back[name][:0:-1])
+    gone = mask.isel(shear=[0, 1]).assign_coords(shear=[0.0, 1.0])
+    assert np.isnan(fc.domains.evolution(gone, frame="lower").overlap[1])
+
+
 def test_islands_are_not_followed_over_more_than_a_spot():
     planes = np.zeros((3, 64, 64), bool)
     planes[:, 10:14, 10:14] = planes[:, 30:34, 40:44] = True
