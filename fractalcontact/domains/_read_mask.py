@@ -58,8 +58,8 @@ def read_mask(
     Returns
     -------
     DataArray of bool, dims (y, x)
-        `mask`, with y upwards: the first row of the image is the last of the mask. The provenance has the
-        threshold and the number of distinct grey values.
+        `mask`, with y upwards: the first row of the image, upright as viewers show it, is the last of the
+        mask. The provenance has the threshold and the number of distinct grey values.
 
     Raises
     ------
@@ -94,38 +94,31 @@ def read_mask(
 
 
 def _grey_values(path: Path) -> Array:
-    """Return the grey values (ny, nx) of an image."""
+    """Return the grey values (ny, nx) of an image, upright as viewers show it."""
+    from PIL import Image, ImageOps
     from skimage.color import rgb2gray
-    from skimage.io import imread
 
     with reading("fractalcontact.domains.read_mask", path):
         content = path.read_bytes()
     try:
-        image = _from_inks(content)
-        image = np.asarray(imread(io.BytesIO(content))) if image is None else image
-    except Exception as error:  # each of the image libraries raises exceptions of its own
+        with Image.open(io.BytesIO(content)) as file:
+            # beside a photograph a telephone may store its preview and its depth (MPO)
+            count = 1 if file.format == "MPO" else int(getattr(file, "n_frames", 1))
+            picture = ImageOps.exif_transpose(file)  # a camera states how it was held
+            if picture.mode == "LA":  # grey value and opacity
+                picture = picture.convert("L")
+            elif picture.mode not in ("1", "L", "F") and not picture.mode.startswith("I"):
+                picture = picture.convert("RGB")  # also from a palette, or from inks
+            image = np.asarray(picture)
+    except Exception as error:  # Pillow raises exceptions of many kinds
         raise UnreadableFile(path.name, [f"path: expected an image, got {type(error).__name__}"]) from error
-    if image.ndim == 3 and image.shape[-1] == 2:  # grey value and opacity
-        image = image[..., 0]
-    if image.ndim == 3 and image.shape[-1] in (3, 4):
-        largest = np.iinfo(image.dtype).max if image.dtype.kind in "iu" else 1
-        image = largest * rgb2gray(image[..., :3])  # as those of a grey image of this type
-    if image.ndim != 2:
-        raise UnreadableFile(path.name, [f"path: expected one image, got an array of shape {image.shape}"])
+    if count != 1:
+        raise UnreadableFile(path.name, [f"path: expected one image, got {count}"])
+    if image.ndim == 3:
+        image = 255.0 * rgb2gray(image)  # as those of a grey image
     if not np.isfinite(image).all():
         raise UnreadableFile(path.name, ["path: expected finite grey values, got some that are not"])
     return image.astype(np.float64)
-
-
-def _from_inks(content: bytes) -> Array | None:
-    """Return the colours of an image of four inks (CMYK), whose numbers are dark where they are large."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(io.BytesIO(content)) as image:
-            return np.asarray(image.convert("RGB")) if image.mode == "CMYK" else None
-    except UnidentifiedImageError:  # of a format that another library reads
-        return None
 
 
 def _threshold(grey: Array, levels: Array, name: str) -> float:

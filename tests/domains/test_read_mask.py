@@ -82,6 +82,39 @@ def test_inks_are_dark_where_they_are_large(tmp_path, suffix):
     np.testing.assert_array_equal(read.values[::-1], mask)
 
 
+def test_one_image_of_any_mode_and_no_more(tmp_path):
+    grey = Image.fromarray(np.uint8(255 * CELLS))
+    for name, image in {
+        "palette.gif": grey,
+        "palette.png": grey.convert("P"),
+        "opacity.png": grey.convert("LA"),
+        "bits.tif": grey.convert("1"),
+        "long.png": Image.fromarray(np.uint16(60000 * CELLS)),
+    }.items():
+        image.save(tmp_path / name)
+        np.testing.assert_array_equal(fc.domains.read_mask(tmp_path / name, 1e-4).values[::-1], CELLS)
+    for name in ("pages.tif", "frames.gif"):
+        grey.save(tmp_path / name, save_all=True, append_images=[Image.fromarray(np.uint8(255 * ~CELLS))])
+        with pytest.raises(UnreadableFile, match="expected one image, got 2"):
+            fc.domains.read_mask(tmp_path / name, 1e-4)
+    large = np.kron(CELLS, np.ones((8, 8), bool))
+    photo, preview = Image.fromarray(np.uint8(255 * large)), Image.new("L", (8, 8))
+    photo.save(tmp_path / "photo.jpg", "MPO", save_all=True, append_images=[preview], quality=95)
+    mask = fc.domains.read_mask(tmp_path / "photo.jpg", 1e-4, threshold=128)
+    np.testing.assert_array_equal(mask.values[::-1], large)
+
+
+@pytest.mark.parametrize("suffix", ["jpg", "png", "tif"])
+def test_picture_of_a_turned_camera_is_upright(tmp_path, suffix):
+    """Orientation 6: the first row of the file is the right side of the picture."""
+    cells, orientation = np.kron(CELLS, np.ones((8, 8), bool)), Image.Exif()
+    orientation[0x0112] = 6
+    turned = Image.fromarray(np.uint8(255 * np.rot90(cells)))
+    turned.save(tmp_path / f"photo.{suffix}", exif=orientation)
+    mask = fc.domains.read_mask(tmp_path / f"photo.{suffix}", 1e-4, threshold=128)
+    np.testing.assert_array_equal(mask.values[::-1], cells)
+
+
 def test_a_threshold_is_a_grey_value_of_the_file(tmp_path):
     grey = np.array([[0, 100, 200], [50, 150, 250]], dtype=np.uint8)
     ski.io.imsave(tmp_path / "grey.png", grey, check_contrast=False)
