@@ -247,7 +247,8 @@ def _check_valid(problems: Problems, valid: Any, mask: xr.DataArray | None) -> b
     core, every = (CORE_DIMS, CORE_DIMS) if mask is None else (mask_dims(mask), tuple(mask.dims))
     dims = tuple(valid.dims) if isinstance(valid, xr.DataArray) else None
     if dims is None or valid.dtype.kind != "b" or (mask is not None and dims not in (core, every)):
-        problems.add("valid", f"a boolean DataArray with dims ({', '.join(core)}) or {every}", valid)
+        got = f"type {valid.dtype}" if dims is not None and valid.dtype.kind != "b" else valid
+        problems.add("valid", f"a boolean DataArray with dims ({', '.join(core)}) or {every}", got)
         return False
     if mask is None:
         return True

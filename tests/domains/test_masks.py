@@ -109,6 +109,8 @@ def test_valid_must_match_the_mask(name, mask):
     for invalid in (mask.isel(step=0).astype(int), mask.isel(step=0, x=slice(3)), np.ones((32, 32))):
         with pytest.raises(ValueError, match="valid: expected"):
             FUNCTIONS[name](mask, valid=invalid)
+    with pytest.raises(ValueError, match="got type int64"):
+        FUNCTIONS[name](mask, valid=mask.isel(step=0).astype(np.int64))
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
