@@ -250,6 +250,8 @@ def _check_raster(raster: Any, band: int, request: Request) -> None:
             known = (None, "", *UNITS, *METRES, raster.crs.linear_units if raster.crs else None)
             is_unit = request.units is not None or stated in known
             problems.require(is_unit, "path", 'a unit of length; give `units` ("m", "mm" ...)', stated)
+        expected = "None for a raster, which has its y, or the top of the image first"
+        problems.require(request.first_row is None, "first_row", expected, request.first_row)
         is_degree = bool(raster.crs) and raster.crs.is_geographic
         problems.require(
             not is_degree, "path", f"projected coordinates; {PROJECT}", "longitudes and latitudes"

@@ -99,7 +99,7 @@ def read(
     first_row : {"bottom", "top"}, optional
         Whether the first row of the file has the smallest y, or is the top of the map, which is flipped.
         Default: "top" for an instrument's file (its reader orders the rows as an image), "bottom" for `.npy`
-        and tables. NetCDF files and rasters have their own y.
+        and tables. NetCDF files, rasters and points have their own y.
     columns, plane : optional
         Of points: see `read_points` and `from_points`.
 
@@ -261,6 +261,8 @@ def _gridded_points(points: xr.Dataset, request: Request) -> xr.DataArray:
     from fractalcontact.surfaces._from_points import from_points, grid_points  # loads numba
 
     units, spacing, stated = request.units, request.spacing, points.attrs["stated_unit"]
+    require_readable(request.channel is None, "channel", "None for points", request.channel)
+    require_readable(request.first_row is None, "first_row", "None for points", request.first_row)
     _warn_of_missing(points["position"].values[..., -1], request.path.name, "points")
     require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
@@ -290,11 +292,13 @@ def _archive_content(request: Request) -> xr.DataArray:
         key: array for key, array in arrays.items() if array.dtype.kind in "fiu" and array.ndim in (2, 3)
     }
     name = array_name(list(heights), request, "an array of heights")
-    values = heights[name]
+    values, request = heights[name], replace(request, channel=None)
     axes = [arrays.get(dim, np.empty(0)) for dim in ("y", "x")]
     axes = [axis.ravel().astype(np.float64) if axis.dtype.kind in "iuf" else np.empty(0) for axis in axes]
     stated, shape = [axis.size for axis in axes], list(values.shape[-2:])
     if spacing is None and stated == shape:
+        expected = "'bottom' beside an array y, which places the rows"
+        require_readable(request.first_row in (None, "bottom"), "first_row", expected, request.first_row)
         steps = [np.diff(in_metres(axis, request.units or "m")) for axis in axes]
         for dim, step in zip(("y", "x"), steps, strict=True):
             is_even = bool(np.ptp(step) <= UNIFORM * abs(step[0])) and step[0] != 0
@@ -324,6 +328,8 @@ def _heights_content(values: Array, request: Request) -> xr.DataArray:
     with Problems("", UnreadableFile) as problems:
         expected = f"{SPACING_NEEDED}, which {request.path.name!r} does not state"
         problems.require(spacing is not None, "spacing", expected, None)
+        expected = f"None for {request.path.name!r}, which has one array of heights"
+        problems.require(request.channel is None, "channel", expected, request.channel)
         if values.dtype.kind == "f":
             problems.not_infinite("path", values)
         if not problems.messages:

@@ -51,6 +51,8 @@ def test_geotiff(tmp_path, packed, suffix):
     np.testing.assert_array_equal(surface.values, HEIGHTS)
     np.testing.assert_allclose(surface.x, [1.0, 3.0, 5.0, 7.0])
     np.testing.assert_allclose(surface.y, [1.5, 4.5, 7.5])
+    with pytest.raises(UnreadableFile, match="first_row: expected None for a raster"):
+        fc.surfaces.read(path, first_row="bottom")
 
 
 def test_missing_values_units_and_feet(tmp_path):

@@ -438,6 +438,23 @@ def test_rows_of_points_and_arrays_are_not_flipped(tmp_path):
     np.testing.assert_array_equal(fc.surfaces.read(tmp_path / "a.npy", spacing=1e-6).values, HEIGHTS)
 
 
+def test_options_without_effect_are_refused(tmp_path):
+    """A map that its user takes for flipped would be the mirror image of what was asked for."""
+    (tmp_path / "a.xyz").write_text("\n".join(f"{k % 5} {k // 5} {k}" for k in range(20)))
+    np.savetxt(tmp_path / "a.csv", HEIGHTS)
+    np.save(tmp_path / "a.npy", HEIGHTS)
+    np.savez(tmp_path / "a.npz", height=HEIGHTS, x=np.arange(4.0), y=np.arange(3.0))
+    for name, option, spacing in [
+        ("a.xyz", {"channel": 1}, None),
+        ("a.xyz", {"first_row": "top"}, None),
+        ("a.csv", {"channel": 1}, 1.0),
+        ("a.npy", {"channel": "height"}, 1.0),
+        ("a.npz", {"first_row": "top"}, None),
+    ]:
+        with pytest.raises(UnreadableFile, match=f"{next(iter(option))}: expected"):
+            fc.surfaces.read(tmp_path / name, units="um", spacing=spacing, **option)
+
+
 def test_netcdf_is_never_flipped(tmp_path):
     fc.save(fc.surfaces.from_array(HEIGHTS, 1e-5), tmp_path / "a.nc")
     with pytest.raises(UnreadableFile, match="first_row: .*NetCDF"):
