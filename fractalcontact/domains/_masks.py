@@ -19,7 +19,7 @@ import xarray as xr
 from fractalcontact.base.grid import UNIFORM, Grid, periodic_axes, read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array as Array
-from fractalcontact.base.numbers import float_array, is_within
+from fractalcontact.base.numbers import float_array, is_within, power_of_two
 from fractalcontact.base.resources import has_blocks, thread_count
 from fractalcontact.base.schema import CORE_DIMS, QUANTITIES, in_cells
 from fractalcontact.base.validation import GIVEN, LARGEST_INTEGER, Problems
@@ -208,10 +208,14 @@ def support_of(mask: Any) -> Any:
 
 
 def measure_of(mask: xr.DataArray, planes: Planes) -> Array | None:
-    """Return a measure as (planes, ny, nx) float64, zero where nothing was observed; None of a mask."""
+    """Return a measure as (planes, ny, nx) float64, zero where nothing was observed; None of a mask.
+
+    Its unit is a power of two near the largest value: no result depends on it, and no square overflows.
+    """
     if mask.dtype.kind != "f":
         return None
-    return np.asarray(mask.values.reshape(planes.cells.shape) * planes.cells, np.float64)
+    values = np.asarray(mask.values.reshape(planes.cells.shape) * planes.cells, np.float64)
+    return values / power_of_two(float(values.max()))
 
 
 def mask_dims(mask: xr.DataArray) -> tuple[str, ...]:

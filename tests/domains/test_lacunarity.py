@@ -253,6 +253,14 @@ def test_lacunarity_of_a_field(wraps, has_gaps):
         fc.domains.lacunarity(-field, [1, 2])
 
 
+@pytest.mark.parametrize("unit", [2.0**-600, 2.0**600])
+def test_unit_of_the_field_changes_no_bit(unit):
+    field = as_mask(np.ones((2, 16, 16))).astype(float)
+    field.values = np.random.default_rng(5).exponential(size=field.shape)
+    first, other = (fc.domains.lacunarity(each).drop_vars("run_time") for each in (field, field * unit))
+    assert first.identical(other.assign_attrs(first.attrs))
+
+
 def test_field_of_one_value_is_a_set():
     cells = np.random.default_rng(3).random((40, 40)) < 0.2
     mask = as_mask(cells, periodic=ROUND)
