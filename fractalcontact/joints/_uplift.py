@@ -513,7 +513,7 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
     axis, length = upstream.axis, grid.extent[upstream.axis]
     filled = np.nan_to_num(pressure)
     profile, mean = filled.mean(axis=-2 if axis == 1 else -1), filled.mean(axis=(-2, -1))
-    centres = [_centre(filled, 0, grid), _centre(filled, 1, grid)]
+    centres = [_centre(pressure, 0, grid), _centre(pressure, 1, grid)]
     # of the joint, then of each diagram: mean, arm, y and x
     rows, profiles = [(mean, flow.distances(centres[axis]), *centres)], [profile]
     for place, p in knots.values():
@@ -534,11 +534,12 @@ def _forces(pressure: Array, flow: HeldFlow, knots: Knots, leading: tuple[str, .
 
 
 def _centre(pressure: Array, axis: int, grid: Grid) -> Array:
-    """Return the distance (m) of the resultant of the pressure from the low edge across an axis."""
-    profile = pressure.mean(axis=-1 if axis == 0 else -2)
+    """Return the distance (m) of the resultant of a pressure, NaN where dry, from the low edge of an axis."""
+    profile = np.nan_to_num(pressure).mean(axis=-1 if axis == 0 else -2)
     spacing = grid.spacing[axis]
     mean = profile.mean(axis=-1)
     moment = (profile * (np.arange(profile.shape[-1]) + 0.5) * spacing).mean(axis=-1)
-    if profile.shape[-1] > 1:  # the pressure falls inside a cell
-        moment = moment + np.gradient(profile, spacing, axis=-1).mean(axis=-1) * spacing**2 / 12.0
+    if profile.shape[-1] > 1:  # the pressure falls inside a cell between wet ones
+        slope = np.nan_to_num(np.gradient(pressure, spacing, axis=axis - 2)) * np.isfinite(pressure)
+        moment = moment + slope.mean(axis=(-2, -1)) * spacing**2 / 12.0
     return np.asarray(np.divide(moment, mean, out=np.full_like(mean, np.nan), where=mean > 0))

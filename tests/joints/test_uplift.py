@@ -240,6 +240,9 @@ def test_water_behind_a_barrier_stands_at_full_head(make_face):
     np.testing.assert_allclose(
         result.uplift_force.sel(diagram="joint"), np.nansum(pressure), rtol=1e-12
     )  # cells of 1 m2; contact carries none
+    behind = uplift(make_face, np.where(np.arange(9) == 4, 0.0, 1e-4) * np.ones((5, 1)))
+    arm = behind.uplift_arm.sel(diagram="joint")
+    np.testing.assert_allclose(arm, 2.0, rtol=1e-12)  # full head on four cells of 1 m
 
 
 def test_one_drain_is_a_well_of_a_fifth_of_the_spacing(make_face):
