@@ -29,6 +29,19 @@ s = fc.surfaces.fbm((300, 307), 1e-4, hurst=0.5, rms_increment=1e-6, rng=1)
 r = fc.dimensions.directions(s)
 print([number.hex() for name in ('hurst', 'ci_low', 'ci_high') for number in r[name].values.tolist()])
 """,
+    "box_dimension": """
+s = fc.surfaces.fbm((300, 300), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
+seen = (s * 0).copy(data=np.random.default_rng(2).random(s.shape)) > 0.05
+r = fc.domains.box_dimension(s > s.quantile(0.7), box_sizes=[1, 2, 100, 150], valid=seen)
+print(r.null_count.values.tolist(), float(r.null_dimension), float(r.null_spread))
+""",
+    "transmissivity": """
+from fractalcontact.joints import _network_pressure
+_network_pressure.pressures.__kwdefaults__['largest_direct'] = 100  # by multigrid
+s = fc.surfaces.fbm((200, 200), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
+r = fc.joints.transmissivity((s - s.quantile(0.2)).clip(0).drop_vars('quantile').assign_attrs(units='m'))
+print(r.transmissivity.values.tolist(), r.residual.values.tolist())
+""",
 }
 
 

@@ -78,12 +78,13 @@ class RandomCells:
         """
         region, share = contents.cells, contents.share
         alone = self.miss(region)
-        independent = share @ (alone * (1.0 - alone)) / contents.boxes
-        return max(float(independent - self.coupling * (share @ (region * alone)) ** 2), 0.0)
+        independent = np.sum(share * alone * (1.0 - alone)) / contents.boxes
+        return max(float(independent - self.coupling * np.sum(share * region * alone) ** 2), 0.0)
 
     def expected_counts(self, contents: Sequence[BoxContents]) -> Array:
         """Return the boxes of each size that meet the set."""
-        met = [of.measure * (of.share @ (1.0 - self.miss(of.cells))) for of in contents]
+        # no product of vectors, the last digits of which depend on the threads of BLAS
+        met = [of.measure * np.sum(of.share * (1.0 - self.miss(of.cells))) for of in contents]
         return np.array(met, float)
 
 
@@ -277,7 +278,7 @@ class NullBoxes:
         contents = [self.contents[size] for size in sizes.tolist()]
         areas = np.array([np.prod(np.minimum(size, self.sides)) for size in sizes], np.int64)
         scatters = null.log_miss(areas) > -60.0  # else 10^6 boxes have a standard deviation of 10^-7 at most
-        sums = [of.boxes * float(of.share @ (of.cells * null.miss(of.cells))) for of in contents]
+        sums = [of.boxes * float(np.sum(of.share * of.cells * null.miss(of.cells))) for of in contents]
         covariance = np.zeros((sizes.size, sizes.size))
         for i, first in enumerate(sizes.tolist()):
             for j, second in enumerate(sizes[: i + 1].tolist()):

@@ -89,9 +89,9 @@ def pressures(
     matrix = (diags_array(diagonal) - links - links.T).tocsr()
     even = even_gradient(network.shape, axis)
     balance = Balance(i, j, conductance, network.jump[chosen], to_held, level)
-    scale = float(np.linalg.norm(balance.surplus(np.zeros(size)))) or 1.0
+    scale = _norm(balance.surplus(np.zeros(size))) or 1.0
     p, most = even.ravel()[inside], dissipation(network, even, inside, held)
-    if np.linalg.norm(balance.surplus(p)) > 1e-14 * scale:  # less where all cells are open alike
+    if _norm(balance.surplus(p)) > 1e-14 * scale:  # less where all cells are open alike
         unknown = _without_reference_cells(matrix) if network.jump.any() else np.ones(size, bool)
         sequence = number[order[inside[order]]]
         sequence = (np.cumsum(unknown) - 1)[sequence[unknown[sequence]]]
@@ -99,7 +99,7 @@ def pressures(
         p = _solve(system, p, sequence, largest_direct)
     missed = balance.beyond_range(p)
     p = balance.within_range(p)  # what this moves is part of the error
-    error = max(float(np.linalg.norm(balance.surplus(p))) / scale, missed)
+    error = max(_norm(balance.surplus(p)) / scale, missed)
     pressure = np.zeros(inside.size)
     pressure[inside] = p
     pressure = pressure.reshape(network.shape)
@@ -264,17 +264,26 @@ def _conjugate_gradients(
     t, previous = np.zeros(b.size), 1.0
     for _ in range(max_iterations):
         z = preconditioner @ r
-        r_z = float(r @ z)
-        is_balanced = np.linalg.norm(r) <= tolerance * system.scale
-        flow = max(system.power - float(b @ x), flow_error * system.power)  # none where no path crosses
+        r_z = _inner(r, z)
+        is_balanced = _norm(r) <= tolerance * system.scale
+        flow = max(system.power - _inner(b, x), flow_error * system.power)  # none where no path crosses
         is_balanced &= r_z <= flow_error * flow
         p[system.unknown] = start[system.unknown] + x
         if is_balanced and system.balance.beyond_range(p) <= tolerance:
             return p
         t = z + (r_z / previous) * t
         a_t = system.matrix @ t
-        tau = r_z / float(t @ a_t)
+        tau = r_z / _inner(t, a_t)
         x += tau * t
         r -= tau * a_t
         previous = r_z
     return None
+
+
+def _inner(first: Array, second: Array) -> float:
+    """Return the inner product of two vectors; the last digits of that of BLAS depend on its threads."""
+    return float(np.einsum("i,i->", first, second))
+
+
+def _norm(vector: Array) -> float:
+    return math.sqrt(_inner(vector, vector))
