@@ -275,12 +275,12 @@ def _press_balanced(
     if abs(at_initial) <= error * (initial + stiffness * abs(opening)):
         return press(initial, contact.problem.keep)
     floor = math.log(initial) if initial > 0 and at_initial < 0 else -math.inf
-    top = math.log(initial - min(at_initial, 0.0))
-    # from a force of the order that closes the opening: far beyond, the interface is lost in the block
-    area = contact.problem.crack.nominal_area
-    closing = contact.problem.modulus * math.sqrt(area) * abs(opening)
-    low = high = min(top, math.log(max(initial, closing)))
-    step = 7.0  # e^7 = 1e3
+    # from a force of the order that closes the opening: from 1e-3 / eps times it on, rounding of the bulk
+    # closure is more than a thousandth of the opening
+    area, step = contact.problem.crack.nominal_area, 7.0  # e^7 = 1e3
+    closing = math.log(max(initial, contact.problem.modulus * math.sqrt(area) * abs(opening)))
+    top = min(math.log(initial - min(at_initial, 0.0)), closing - math.log(math.ulp(1.0)) - step)
+    low = high = min(top, closing)
     while high < top and log_excess(high) < 0:
         low, high, step = high, min(high + step, top), 2 * step
     while low > floor and log_excess(low) > 0:
