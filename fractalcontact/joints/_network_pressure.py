@@ -19,7 +19,9 @@ UNKNOWN = (
     "NaN where the pressure comes out beyond those at the ends, or the flow beyond its bounds: the openings "
     "differ by more than the precision of the computer resolves"
 )
-DIRECT_CELLS = 300_000  # up to which elimination is faster than multigrid
+# up to which elimination is faster than multigrid: 384 x 384 of a rough opening took 1.3 and 2.5 s, 512 x 512
+# 2.4 and 3.1 s, 700 x 700 5.4 and 4.9 s
+DIRECT_CELLS = 300_000
 
 
 def flow_memory(plane: Plane, _: Mapping[str, Any]) -> float:
@@ -58,21 +60,14 @@ def _dissected(cells: Array) -> list[Array]:
 
 
 def pressures(
-    network: Network,
-    inside: Array,
-    order: Array,
-    held: Held,
-    axis: int = 1,
-    *,
-    largest_direct: int = DIRECT_CELLS,
+    network: Network, inside: Array, order: Array, held: Held, axis: int
 ) -> tuple[Array, float]:
     """Return the pressure in every cell, zero outside the chosen clusters, and its error.
 
     No pressure leaves the range of those that are held. The error is the relative residual, by how much the
     solution left that range, or by how much it dissipates more than an even gradient along `axis` (Dirichlet:
     the true pressure dissipates least), whichever is most. `inside` are whole clusters of open cells, and
-    `order` all cells as elimination takes them, which is faster than multigrid up to `largest_direct` cells:
-    384 x 384 of a rough opening took 1.3 and 2.5 s, 512 x 512 2.4 and 3.1 s, 700 x 700 5.4 and 4.9 s.
+    `order` all cells as elimination takes them.
     """
     from scipy.sparse import coo_array, diags_array
 
@@ -96,7 +91,7 @@ def pressures(
         sequence = number[order[inside[order]]]
         sequence = (np.cumsum(unknown) - 1)[sequence[unknown[sequence]]]
         system = System(matrix[unknown][:, unknown], unknown, balance, most, scale)
-        p = _solve(system, p, sequence, largest_direct)
+        p = _solve(system, p, sequence)
     missed = balance.beyond_range(p)
     p = balance.within_range(p)  # what this moves is part of the error
     error = max(_norm(balance.surplus(p)) / scale, missed)
@@ -160,7 +155,7 @@ def _without_reference_cells(matrix: Any) -> Array:
     return unknown
 
 
-def _solve(system: System, start: Array, order: Array, largest_direct: int) -> Array:
+def _solve(system: System, start: Array, order: Array) -> Array:
     """Solve a large system by multigrid where it is installed, a small one by elimination in this order.
 
     Elimination is refined with what is left of the balance (Wilkinson): its factors lose the level of deep
@@ -169,7 +164,7 @@ def _solve(system: System, start: Array, order: Array, largest_direct: int) -> A
     from scipy.sparse.linalg import splu
 
     matrix, count = system.matrix, system.matrix.shape[0]
-    if count > largest_direct and find_spec("pyamg") is not None:
+    if count > DIRECT_CELLS and find_spec("pyamg") is not None:
         p = _conjugate_gradients(system, start, _multigrid(matrix))
         if p is not None:
             return p

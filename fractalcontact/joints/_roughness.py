@@ -13,7 +13,7 @@ from fractalcontact.base.compass import Direction, check_directions, direction_c
 from fractalcontact.base.grid import DECADES, Grid, core_dims, read_grid
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import ROUNDING, detrended, rounding_of, slopes
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.validation import NONE, Problems, Words
 from fractalcontact.joints._criteria import LARGEST_JRC, REGRESSIONS, SAMPLE_LENGTH, scaled_roughness
 
@@ -28,27 +28,32 @@ REFERENCES = (
 )
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> tuple[Any, float]:
+    """Return directions and lag, those of the call or the defaults."""
     given = problems.given
+    direction = given.direction
     directions_are_valid = given.direction is None or check_directions(problems)
     lag_is_valid = problems.number("lag", above=0, at_most=10.0**DECADES, optional=True)
     lag_is_valid = problems.choice("regression", among=REGRESSIONS) and lag_is_valid
     problems.number("length", at_least=SAMPLE_LENGTH, at_most=10.0**DECADES, optional=True)
     if not problems.surface("surface", finite=False, profile=True):
-        return
+        return direction, math.nan
     is_observed = bool(np.isfinite(given.surface.values).any())
     problems.require(is_observed, "surface", "observed heights", Words("nothing but NaN"))
     if not (directions_are_valid and lag_is_valid):
-        return
+        return direction, math.nan
     grid = read_grid(given.surface, core_dims(given.surface))
-    interval = _lag_or_default(given.lag, given.regression)
-    for towards in read_directions(_direction_or_default(given.direction, given.surface)):
+    interval = REGRESSIONS[given.regression][0].interval if given.lag is None else float(given.lag)
+    if direction is None:
+        direction = ("E", "N")[: len(grid.shape)]
+    for towards in read_directions(direction):
         if len(grid.shape) == 1 and towards.unit[0] != 0.0:
             problems.add("direction", "E or W for a profile", towards.name)
             continue
         cells = _lag_cells(grid.spacing, towards, interval)
         fits = all(abs(n) < size for n, size in zip(cells, grid.shape, strict=True))
         problems.require(fits, "surface", f"heights {interval:g} m apart towards {towards.name}", NONE)
+    return direction, interval
 
 
 @public_result(
@@ -63,7 +68,10 @@ def _check(problems: Problems) -> None:
     check=_check,
     memory=50.0,
 )
+@takes_checked
 def roughness_coefficient(
+    checked: tuple[Any, float],
+    /,
     surface: xr.DataArray,
     *,
     direction: str | float | Sequence[str | float] | None = None,
@@ -133,11 +141,8 @@ def roughness_coefficient(
     >>> result.roughness_coefficient.values.round(1).tolist()  # 61.79 * 0.2 - 3.47
     [8.9]
     """
-    dims = core_dims(surface)
-    grid = read_grid(surface, dims)
-    chosen_direction = _direction_or_default(direction, surface)
-    directions = read_directions(chosen_direction)
-    interval = _lag_or_default(lag, regression)
+    (direction, interval), grid = checked, read_grid(surface, core_dims(surface))
+    directions = read_directions(direction)
     heights = detrended(np.asarray(surface.values, dtype=np.float64), 1, grid.periodic)[0]
     rows, limits = [], np.full((2, len(directions)), np.nan)
     with Problems("") as problems:
@@ -173,20 +178,10 @@ def roughness_coefficient(
     result = xr.Dataset(
         {name: ("direction", values) for name, values in variables.items()},
         coords=direction_coords(directions),
-        attrs={"parameters": {"direction": chosen_direction, "lag": interval}},
+        attrs={"parameters": {"direction": direction, "lag": interval}},
     )
     _add_notes(result)
     return result
-
-
-def _direction_or_default(direction: Any, surface: xr.DataArray) -> Any:
-    if direction is not None:
-        return direction
-    return ("E", "N") if len(core_dims(surface)) == 2 else ("E",)
-
-
-def _lag_or_default(lag: float | None, regression: str) -> float:
-    return REGRESSIONS[regression][0].interval if lag is None else float(lag)
 
 
 def _add_notes(result: xr.Dataset, tolerance: float = 0.1, largest_turn: float = 5.0) -> None:

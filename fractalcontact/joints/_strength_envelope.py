@@ -11,7 +11,7 @@ import xarray as xr
 
 from fractalcontact.base.compass import read_direction
 from fractalcontact.base.numbers import Array, float_array
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.validation import Problems, require, word_tuple
 from fractalcontact.joints import _criteria
 from fractalcontact.joints._roughness import FACET_BYTES, directional_roughness
@@ -23,13 +23,14 @@ OUTSIDE = "outside the range of the criterion where in_range is False"
 BELOW_VERTICAL = "less than 90 degrees with the basic friction angle"
 
 
-def _check(problems: Problems) -> None:
+def _check(problems: Problems) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Return the arguments and the criteria to compute."""
     given = problems.given
     problems.numbers("nominal_pressure", **_criteria.POSITIVE)
     are_numbers = _criteria.check_quantities(problems, "wall_strength", "basic_friction_angle")
     chosen: tuple[str, ...] = ()
     if given.criterion is None:
-        chosen = _usable(vars(given))
+        chosen = tuple(name for name in _criteria.STRENGTH if not _missing(name, vars(given)))
         expected = "heights, or an asperity_angle or roughness_coefficient in their place"
         problems.require(bool(chosen), "surface", expected)
     elif problems.choices("criterion", among=_criteria.STRENGTH):
@@ -42,6 +43,7 @@ def _check(problems: Problems) -> None:
         total = float(given.asperity_angle) + float(given.basic_friction_angle)
         problems.require(total < 90.0, "asperity_angle", BELOW_VERTICAL, total)
     _criteria.check_measured(problems, measured_coefficient, directional_roughness)
+    return vars(given), chosen
 
 
 def _missing(criterion: str, given: Mapping[str, Any]) -> list[str]:
@@ -50,10 +52,6 @@ def _missing(criterion: str, given: Mapping[str, Any]) -> list[str]:
     return [
         need for need in _criteria.STRENGTH[criterion].needs if given[need] is None and need not in measured
     ]
-
-
-def _usable(given: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(name for name in _criteria.STRENGTH if not _missing(name, given))
 
 
 def _use_asperities(criteria: Sequence[str]) -> bool:
@@ -69,7 +67,10 @@ def _use_asperities(criteria: Sequence[str]) -> bool:
     check=_check,
     memory=FACET_BYTES,
 )
+@takes_checked
 def strength_envelope(
+    checked: tuple[dict[str, Any], tuple[str, ...]],
+    /,
     surface: xr.DataArray | None = None,
     *,
     nominal_pressure: float | Sequence[float],
@@ -156,19 +157,7 @@ def strength_envelope(
     >>> round(tested.shear_strength.item() / 1e6, 3)  # 1 MPa times tan(25 + 10 * 2 degrees)
     1.0
     """
-    pressure = float_array(nominal_pressure)
-    given = {
-        "surface": surface,
-        "wall_strength": wall_strength,
-        "basic_friction_angle": basic_friction_angle,
-        "residual_friction_angle": residual_friction_angle,
-        "roughness_coefficient": roughness_coefficient,
-        "asperity_angle": asperity_angle,
-        "tensile_strength": tensile_strength,
-        "cohesion": cohesion,
-        "length": length,
-    }
-    chosen = _usable(given) if criterion is None else word_tuple(criterion)
+    (given, chosen), pressure = checked, float_array(nominal_pressure)
     measured = _measured(surface, direction)
     joint = _criteria.Joint.of(given, measured)
     if _use_asperities(chosen):  # an angle that is given has been checked: this one is measured

@@ -17,7 +17,7 @@ from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.grid import periodic_axes, read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array, power_of_two
-from fractalcontact.base.results import public_result
+from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.validation import Problems, word_tuple
 from fractalcontact.joints import _flow_network
 from fractalcontact.joints._criteria import HYDRAULIC_APERTURE, LARGEST_JRC, POSITIVE
@@ -256,7 +256,8 @@ APERTURE_BOUNDS: dict[str, dict[str, Any]] = {
 }
 
 
-def _check_apertures(problems: Problems) -> None:
+def _check_apertures(problems: Problems) -> dict[str, xr.DataArray]:
+    """Return the arguments that are given, labelled."""
     given = problems.given
     others = {name: getattr(given, name) for name in APERTURE_BOUNDS if name != "aperture"}
     for name, bounds in APERTURE_BOUNDS.items():
@@ -269,15 +270,18 @@ def _check_apertures(problems: Problems) -> None:
             else:
                 problems.require(value is None, name, f"nothing with {given.model!r}")
     if problems.messages:
-        return
-    arrays = [_labelled(value) for value in (given.aperture, *others.values()) if value is not None]
-    lengths = {array.size for array in arrays if array.dims == ("point",)}
-    if problems.require(len(lengths) < 2, "aperture", "arrays of one shape, or numbers", sorted(lengths)):
-        spread = given.spread if given.model == "zimmerman_bodvarsson" else 0.0
-        variation = float((_labelled(spread) / _labelled(given.aperture)).max())
+        return {}
+    stated = {name: getattr(given, name) for name in APERTURE_BOUNDS}
+    arrays = {name: _labelled(value) for name, value in stated.items() if value is not None}
+    lengths = {array.size for array in arrays.values() if array.dims == ("point",)}
+    is_one_shape = len(lengths) < 2
+    problems.require(is_one_shape, "aperture", "arrays of one shape, or numbers", sorted(lengths))
+    if is_one_shape and given.model == "zimmerman_bodvarsson":
+        variation = float((arrays["spread"] / arrays["aperture"]).max())
         # the next term of the series of s/E, 1.9 (s/E)^4, is then 12 % of E^3
         is_small = variation <= 0.5
         problems.require(is_small, "spread", "at most 0.5 of the aperture", f"{variation:.3g} of it")
+    return arrays
 
 
 @public_result(
@@ -290,7 +294,10 @@ def _check_apertures(problems: Problems) -> None:
     achieved_error="that of the relation, see page theory_joints",
     check=_check_apertures,
 )
+@takes_checked
 def hydraulic_aperture(
+    arrays: dict[str, xr.DataArray],
+    /,
     aperture: float | Sequence[float] | Array | xr.DataArray,
     *,
     model: str = "barton_bandis",
@@ -339,21 +346,10 @@ def hydraulic_aperture(
     >>> (result.hydraulic_aperture * 1e6).values.round(1).tolist()  # alike from 10^2.5 = 316 micrometres on
     [126.5, 500.0]
     """
-    given = {
-        "roughness_coefficient": roughness_coefficient,
-        "spread": spread,
-        "contact_fraction": contact_fraction,
-    }
-    mechanical = _labelled(aperture)
     formula, needs = HYDRAULIC_APERTURE[model]
-    hydraulic = formula(mechanical, *(_labelled(given[name]) for name in needs))
-    return xr.Dataset(
-        {
-            "aperture": mechanical,
-            "hydraulic_aperture": hydraulic.drop_attrs(),
-            "transmissivity": hydraulic.drop_attrs() ** 3 / 12.0,
-        }
-    )
+    hydraulic = formula(*(arrays[name] for name in ("aperture", *needs))).drop_attrs()
+    variables = {"hydraulic_aperture": hydraulic, "transmissivity": hydraulic**3 / 12.0}
+    return xr.Dataset({"aperture": arrays["aperture"], **variables})
 
 
 def _labelled(value: Any) -> xr.DataArray:
