@@ -78,6 +78,20 @@ def spread_indices(count: int, most: int) -> list[int]:
     return sorted({round(float(i)) for i in np.linspace(0, count - 1, min(count, most))})
 
 
+def turning_points(path: Array) -> Array:
+    """Return the indices of a path at which it begins, turns back, and ends; a pause is no turn.
+
+    Examples
+    --------
+    >>> turning_points(np.array([0.0, 1.0, 1.0, 3.0, 2.0])).tolist()
+    [0, 3, 4]
+    """
+    ways = np.sign(np.diff(path))
+    moves = np.flatnonzero(ways)
+    turns = moves[1:][ways[moves[1:]] != ways[moves[:-1]]]
+    return np.array([0, *turns.tolist(), path.size - 1])
+
+
 def power_of_two(value: float) -> float:
     """Return the power of two next above a value, by which a division loses no digit; 1 for zero."""
     return math.ldexp(1.0, math.frexp(value)[1]) if value > 0 else 1.0

@@ -12,7 +12,7 @@ import xarray as xr
 
 from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.labelled import leading_coords
-from fractalcontact.base.numbers import Array
+from fractalcontact.base.numbers import Array, turning_points
 from fractalcontact.base.regression import student_quantile
 from fractalcontact.base.results import public_result
 from fractalcontact.base.schema import PREFERRED_LAW
@@ -440,6 +440,4 @@ def _local_slope(x: Array, w: Array, exponent: float, place: int) -> tuple[float
 
 def branches(pressure: Array) -> list[Array]:
     """Return the steps of each rise and fall of the force, with the turning points at both ends."""
-    reversals = np.flatnonzero(np.diff(np.sign(np.diff(pressure)))) + 1
-    ends = [0, *reversals.tolist(), pressure.size - 1]
-    return [np.arange(first, last + 1) for first, last in itertools.pairwise(ends)]
+    return [np.arange(first, last + 1) for first, last in itertools.pairwise(turning_points(pressure))]

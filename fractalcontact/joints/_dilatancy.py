@@ -14,8 +14,8 @@ from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
-from fractalcontact.joints._crack import Block, Crack, Pair, check_sliding
-from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
+from fractalcontact.joints._crack import Crack, check_sliding
+from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
 from fractalcontact.joints._sheared_contact import (
     CONTACT_OPTIONS,
     PRESS_BYTES,
@@ -159,38 +159,6 @@ def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction])
 
 def rigid_dilatancies(crack: Crack, shears: Array, directions: Sequence[Direction]) -> tuple[Array, float]:
     """Return the rigid dilatancy, shape (direction, shear), and the separation that it counts from, m."""
-    initial = separations(*crack.faces(), crack.layout, np.zeros(1), (0.0, 1.0))[0]
-    highest = np.empty((len(directions), shears.size))
-    for row, towards in zip(highest, directions, strict=True):
-        row[:] = separations(*crack.faces(), crack.layout, shears, towards.unit)
-        if not np.isfinite(row).all():
-            raise missing_heights(crack, towards, float(shears[~np.isfinite(row)][0]))
-    return highest - initial, float(initial)
-
-
-def separations(lower: Array, upper: Array, block: Block, shears: Array, unit: Pair) -> Array:
-    """Return max over the block of (lower(x + v) - upper(x)) for every shear.
-
-    Parameters
-    ----------
-    lower : ndarray, shape (ny, nx)
-        The whole lower face, m.
-    upper : ndarray, shape block.cells
-        The face of the block, m.
-    block : Block
-    shears : ndarray, shape (n,)
-        Metres, inside the travel.
-    unit : pair of float
-        Direction of sliding, (y, x).
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Metres; NaN where heights are missing in the path.
-    """
-    difference = np.empty(block.cells)
-    highest = np.empty(shears.shape)
-    for index, shear in enumerate(shears):
-        under = heights_under(lower, block, block.shift(float(shear), unit))
-        highest[index] = np.subtract(under, upper, out=difference).max()
-    return highest
+    initial = float(delta_heights(crack, 0.0, directions[0]).max())
+    highest = [[delta_heights(crack, float(shear), towards).max() for shear in shears] for towards in directions]
+    return np.array(highest) - initial, initial

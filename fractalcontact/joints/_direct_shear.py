@@ -15,7 +15,7 @@ import fractalcontact as fc
 from fractalcontact.base.compass import Direction, check_direction, read_direction
 from fractalcontact.base.errors import ConvergenceWarning, warn
 from fractalcontact.base.grid import UNIFORM
-from fractalcontact.base.numbers import ROUNDED, Array, float_array
+from fractalcontact.base.numbers import ROUNDED, Array, float_array, turning_points
 from fractalcontact.base.results import public_result, takes_checked
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import joined_references
@@ -38,8 +38,9 @@ MAPS = ("residual_lower", "residual_upper")
 PATTON = "Patton (1966), 1st ISRM Congress 1:509 (friction on inclined contacts)"
 
 
-def _check(problems: Problems) -> JointProblem | None:
-    given = problems.given
+def _check(problems: Problems) -> tuple[JointProblem | None, list[Array]]:
+    """Return how the joint is pressed, and the legs of its path."""
+    given, legs = problems.given, []
     problems.boolean("progress")
     problems.number("normal_stiffness", **POSITIVE, optional=True)
     problems.number("shear_stiffness", **POSITIVE, optional=True)
@@ -57,29 +58,39 @@ def _check(problems: Problems) -> JointProblem | None:
     problem = check_problem(problems, hardness=hardness, nominal_pressure=load)
     path_is_valid = problems.numbers("path", at_least=-POSITIVE["at_most"], at_most=POSITIVE["at_most"])
     if check_direction(problems) and path_is_valid and isinstance(given.crack, Crack):
-        _check_path(problems, given.crack, _turning_points(given.path), read_direction(given.direction))
-    return problem
+        legs = _read_path(problems, given.crack, given.path, read_direction(given.direction))
+    return problem, legs
 
 
-def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards: Direction) -> None:
+def _read_path(problems: Problems, crack: Crack, path: Any, towards: Direction) -> list[Array]:
+    """Check a path; return the positions of every leg, cell by cell, with both its ends.
+
+    A stop on the way ends none.
+    """
     problems.finite("crack.lower", crack.faces()[0], remedy=FILL)
     step = _cell_step(crack, towards)
     if step is None:
         expected = "one along which the block comes back onto the grid, such as E or N"
         problems.add("direction", expected, towards.name)
-        return
-    cells = turning_points / step
+        return []
+    stops = np.concatenate([[0.0], float_array(path)])
+    cells = stops / step
     on_grid = bool((np.abs(cells - np.rint(cells)) <= UNIFORM * np.maximum(np.abs(cells), 1.0)).all())
     expected = f"multiples of {step:g} m, the cells along {towards.name}: wear stays on the grid"
-    given = turning_points[1:].tolist()  # the path begins at 0
+    given = stops[1:].tolist()  # the path begins at 0
     if problems.require(on_grid, "path", expected, given):
         moves = bool((np.diff(np.rint(cells)) != 0).all())
         problems.require(moves, "path", "positions other than the one before, the first not 0", given)
     y, x = towards.unit
-    for reach, unit in ((turning_points.max(), (y, x)), (-turning_points.min(), (-y, -x))):
+    for reach, unit in ((stops.max(), (y, x)), (-stops.min(), (-y, -x))):
         travel = crack.layout.travel(unit)
         expected = f"at most {travel:g} m this way, where the block meets the edge of the face"
         problems.require(bool(reach <= travel + UNIFORM * step), "path", expected, float(reach))
+    if problems.messages:
+        return []
+    whole = np.rint(cells).astype(np.int64)
+    ends = itertools.pairwise(whole[turning_points(whole)])
+    return [step * np.arange(a, b + np.sign(b - a), np.sign(b - a)) for a, b in ends]
 
 
 @public_result(
@@ -95,7 +106,7 @@ def _check_path(problems: Problems, crack: Crack, turning_points: Array, towards
 )
 @takes_checked
 def direct_shear(
-    problem: JointProblem,
+    checked: tuple[JointProblem, list[Array]],
     /,
     crack: Crack,
     path: float | Sequence[float] | Array,
@@ -178,10 +189,8 @@ def direct_shear(
     >>> bool(test.peak_friction_angle[0] > test.peak_friction_angle[1] > 30)  # falls with the pressure
     True
     """
-    towards = read_direction(direction)
-    step = _cell_step(crack, towards)
-    assert step is not None
-    legs = _legs(_turning_points(path), step)
+    (problem, legs), towards = checked, read_direction(direction)
+    step = abs(float(legs[0][1]))  # the first leg begins at 0
     pressures, names = float_array(nominal_pressure), word_tuple(keep)
     area = crack.nominal_area
     spring = 0.0 if normal_stiffness is None else float(normal_stiffness) * area
@@ -191,30 +200,19 @@ def direct_shear(
     # within one step the stress does not change
     length = max(PEAK_SHARE * math.sqrt(area), 2 * step) if distance is None else max(float(distance), step)
     result = _dataset(crack, joints, legs, pressures, shear_stiffness, min(length, float(np.ptp(legs[0]))))
-    for name, index in zip(MAPS, (0, 1), strict=True):
+    for index, name in enumerate(MAPS):
         if name in names:
             faces = np.stack([joint.faces()[index].values for joint in joints])
             coords = {dim: crack.lower.coords[dim].variable for dim in ("y", "x")}
             result[name] = ("nominal_pressure", "y", "x"), faces
             result = result.assign_coords(coords)
-    residual = max(joint.residual for joint in joints)
-    _warn(joints)
-    references = joined_references(PATTON, problem.references)
-    return result.assign_attrs(references=references, achieved_residual=residual)
-
-
-def _warn(joints: Sequence[WornJoint]) -> None:
-    """Warn of presses that did not converge, and of slopes beyond small strains."""
-    steepest = max(joint.steepest for joint in joints)
-    fc.contact.solver.warn_steep(f"{WHERE}: the delta-surface", steepest)
-    failed = sum(joint.unconverged for joint in joints)
-    if failed:
+    fc.contact.solver.warn_steep(f"{WHERE}: the delta-surface", max(joint.steepest for joint in joints))
+    if failed := sum(joint.unconverged for joint in joints):
         message = f"{WHERE}: the solver did not converge {failed} times; see the achieved residual"
         warn(message, ConvergenceWarning)
-
-
-def _turning_points(path: Any) -> Array:
-    return np.concatenate([[0.0], float_array(path)])
+    residual = max(joint.residual for joint in joints)
+    references = joined_references(PATTON, problem.references)
+    return result.assign_attrs(references=references, achieved_residual=residual)
 
 
 def _cell_step(crack: Crack, towards: Direction, most: int = 8) -> float | None:
@@ -229,14 +227,6 @@ def _cell_step(crack: Crack, towards: Direction, most: int = 8) -> float | None:
         if all(part == math.floor(part) for part in layout.shift(step, towards.unit)):
             return step
     return None
-
-
-def _legs(turning_points: Array, step: float) -> list[Array]:
-    """Return the positions of every leg, cell by cell, with both its ends; a stop on the way ends none."""
-    cells = np.rint(turning_points / step).astype(np.int64)
-    senses = np.sign(np.diff(cells))
-    cells = cells[np.concatenate([[True], senses[1:] != senses[:-1], [True]])]
-    return [step * np.arange(a, b + np.sign(b - a), np.sign(b - a)) for a, b in itertools.pairwise(cells)]
 
 
 def _test(joint: WornJoint, legs: Sequence[Array], force: float, spring: float, progress: bool) -> None:

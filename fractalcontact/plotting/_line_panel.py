@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.numbers import Array, spread_indices
+from fractalcontact.base.numbers import Array, spread_indices, turning_points
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._inputs import quantity, table
 from fractalcontact.plotting._style import Axes
@@ -247,10 +247,7 @@ class LinePanel:
 
 def legs(x: Array) -> list[slice]:
     """Return the parts of a path between the points at which it turns back, which both have."""
-    ways = np.sign(np.diff(x))
-    moves = np.flatnonzero(ways)  # a pause is no turn
-    turns = moves[1:][ways[moves[1:]] != ways[moves[:-1]]]
-    return [slice(first, last + 1) for first, last in pairwise([0, *turns.tolist(), x.size - 1])]
+    return [slice(first, last + 1) for first, last in pairwise(turning_points(x).tolist())]
 
 
 def _isolated_points(x: Array, y: Array) -> dict[str, Any]:
