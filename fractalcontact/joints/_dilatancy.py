@@ -160,5 +160,7 @@ def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction])
 def rigid_dilatancies(crack: Crack, shears: Array, directions: Sequence[Direction]) -> tuple[Array, float]:
     """Return the rigid dilatancy, shape (direction, shear), and the separation that it counts from, m."""
     initial = float(delta_heights(crack, 0.0, directions[0]).max())
-    highest = [[delta_heights(crack, float(shear), towards).max() for shear in shears] for towards in directions]
+    highest = [
+        [delta_heights(crack, float(shear), towards).max() for shear in shears] for towards in directions
+    ]
     return np.array(highest) - initial, initial

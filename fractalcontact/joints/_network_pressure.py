@@ -59,9 +59,7 @@ def _dissected(cells: Array) -> list[Array]:
     return [*_dissected(cells[:, :middle]), *_dissected(cells[:, middle + 1 :]), cells[:, middle]]
 
 
-def pressures(
-    network: Network, inside: Array, order: Array, held: Held, axis: int
-) -> tuple[Array, float]:
+def pressures(network: Network, inside: Array, order: Array, held: Held, axis: int) -> tuple[Array, float]:
     """Return the pressure in every cell, zero outside the chosen clusters, and its error.
 
     No pressure leaves the range of those that are held. The error is the relative residual, by how much the

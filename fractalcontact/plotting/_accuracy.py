@@ -52,7 +52,7 @@ def error_against_time(result: Any, *, units: Units | None = None, axes: Panels 
         on_front = table(data, "on_pareto_front", PLANE) > 0
         for ax, (cost, title) in zip(row, COSTS.items(), strict=True):
             x, y = quantity(data, cost, PLANE, title), quantity(data, "error", PLANE, "true error")
-            panel = LinePanel(ax, x, y, methods)
+            panel = LinePanel(ax, data, x, y, PLANE, methods)
             face = ax.get_facecolor()
             for i, own in enumerate(methods.styles):
                 finite = np.isfinite(y.values[i]) & np.isfinite(x.values[i])
@@ -133,7 +133,7 @@ def estimator_errors(result: Any, *, axes: Panels | None = None) -> AxesArray:
 
 def _draw_against_hurst(ax: Axes, case: xr.Dataset, name: str, title: str, methods: Family) -> LinePanel:
     hurst, dims = "true Hurst exponent", ("method", "hurst")
-    panel = LinePanel.of(ax, case, "hurst", name, dims, methods, x_name=hurst, y_name=title)
+    panel = LinePanel(ax, case, "hurst", name, dims, methods, x_name=hurst, y_name=title)
     ends = panel.interval(name)
     for i, (method, own) in enumerate(zip(methods.labels, methods.styles, strict=True)):
         finite = np.isfinite(panel.y.values[i])

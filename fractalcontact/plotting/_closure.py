@@ -62,7 +62,7 @@ def closure_laws(
     with Problems("fc.plotting") as problems:
         last = data.sizes["step"] - 1
         problems.numbers("marked", marked if len(marked) else 0, at_least=-1, at_most=last, integral=True)
-    panel = LinePanel.of(ax, data, "closure", loads, _paths.PATH, _paths.by_shear(data), x_name="closure")
+    panel = LinePanel(ax, data, "closure", loads, _paths.PATH, _paths.by_shear(data), x_name="closure")
     inner = "interface_closure" if "interface_closure" in data else "closure"
     if inner == "interface_closure":
         panel.curves("interface closure", x=inner, key=r"interface, $w_\mathrm{int}$")
@@ -85,7 +85,7 @@ def _draw_laws(result: Any, laws: Any, key: bool, log: bool, units: Units | None
     fitted = result_of(laws, (*LAW_CONSTANTS, "preferred_law"), ("shear",), argument="laws")
     count, of_laws = data.sizes["shear"], fitted.sizes["shear"]
     require(of_laws == count, "laws", f"{count} shears, as of the closure", of_laws)
-    panel = LinePanel.of(ax, data, *names, _paths.PATH, _paths.by_shear(data))
+    panel = LinePanel(ax, data, *names, _paths.PATH, _paths.by_shear(data))
     points, pressure = panel.x.values, panel.y.values
     if "seated_closure" in fitted:
         points = table(fitted, "seated_closure", _paths.PATH)
@@ -120,7 +120,7 @@ def hydraulic_aperture(result: Any, *, units: Units | None = None, ax: Axes | No
     data = result_of(result, ("hydraulic_aperture",), (*_paths.PATH, "axis"), units)
     dims, x, family = _paths.path_axis(data, None)
     aperture = quantity(data, "hydraulic_aperture", ("axis", *dims))
-    panel = LinePanel.of(ax, data, x, aperture, dims, family, points=_style.MAX_MARKED_POINTS)
+    panel = LinePanel(ax, data, x, aperture, dims, family, points=_style.MAX_MARKED_POINTS)
     axes = words(data["axis"]) if "axis" in data.coords else []
     for i, values in enumerate(aperture.values):
         name = f"along {axes[i]}" if axes else "flow"
@@ -177,7 +177,7 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     dim = "x" if "x" in profile.dims else "y"
     length, pressure = _maps.plane_scale(plane), scale_of(plane)
     place = Quantity(profile[dim].values, length, f"${dim}$")
-    panel = LinePanel(right, place, Quantity(profile.values, pressure, "uplift"), points=0)
+    panel = LinePanel(right, data, place, Quantity(profile.values, pressure, "uplift"), points=0)
     mark: dict[str, Any] = {"marker": "^", "ls": "", "ms": 6, "clip_on": False, "zorder": 3}
     for name in diagrams:
         style = {"color": _style.ink(), **LINES[name]}

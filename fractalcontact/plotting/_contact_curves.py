@@ -43,7 +43,7 @@ def contact_area(
     against = against or _paths.force_of(as_dataset(result))
     data = result_of(result, ("contact_fraction", against), PATH, units)
     loads, shears, name = _paths.loads_of(data, against), _paths.by_shear(data), "real / nominal contact area"
-    panel = LinePanel.of(ax, data, loads, "contact_fraction", PATH, shears, y_name=name)
+    panel = LinePanel(ax, data, loads, "contact_fraction", PATH, shears, y_name=name)
     if "corrected_contact_fraction" in data:
         panel.curves(CORRECTED, "corrected_contact_fraction", key=CORRECTED)
         panel.curves("cell count", key="cell count", **_style.DASHED)
@@ -129,7 +129,7 @@ def path(
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
     y = quantity(data, names[0], dims, title, np.array(values))
-    panel = LinePanel.of(ax, data, x, y, dims, family, points=_style.MOST_DOTS)
+    panel = LinePanel(ax, data, x, y, dims, family, points=_style.MOST_DOTS)
     for name, rows, line in zip(names, values, cycle(_style.LINES), strict=False):
         title = name_of(data[name])
         panel.curves(title, rows, ls=line, ms=3.0, key=title if len(names) > 1 else "")
@@ -174,7 +174,7 @@ def pressure_distribution(
     if theory is not None:
         spread = float(result_of(theory, ("pressure_spread",), ())["pressure_spread"])
     family = _paths.by_load(data.drop_vars("normal_force", errors="ignore"))
-    panel = LinePanel(_style.axes_or_new(ax), x, y, family, points=0)
+    panel = LinePanel(ax, data, x, y, ("step", "pressure_class"), family, points=0)
     for i in np.flatnonzero(greatest > 0).tolist():
         own, pressure = family.styles[i], x.values[i]
         density = share[i] * classes.size / greatest[i]
@@ -210,11 +210,11 @@ def area_by_resolution(
     result = result_of(result, names, ("shear", "step", "resolution"), units)
     data, dims = _paths.at_shear(result, shear), ("step", "resolution")
     spacing, loads = quantity(data, "resolution", dims[1:], "spacing"), _paths.by_load(data)
-    panel = LinePanel.of(ax, data, spacing, "contact_fraction", dims, loads)
+    panel = LinePanel(ax, data, spacing, "contact_fraction", dims, loads)
     panel.curves("cells", key="cells", marker="o")
     style = {"marker": "s", "ms": 3.5} | _style.DASHED
     panel.curves(CORRECTED, "corrected_contact_fraction", key=CORRECTED, **style)
-    panel.ax.set_title(_paths.shear_text(data))
+    panel.ax.set_title(_paths.shear_text(data, data))
     panel.finish(log="xy")
     panel.ax.set_xticks(spacing.shown, [f"{value:g}" for value in spacing.shown])
     panel.ax.set_xticks([], minor=True)
@@ -231,7 +231,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     sticking = Quantity(share, PER_CENT, "part of the contact that sticks")
     shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1))
     for ax, x, y in zip(shown, (displacement, force), (force, sticking), strict=True):
-        panel = LinePanel(ax, x, y, _paths.by_shear(data), points=_style.MAX_MARKED_POINTS)
+        panel = LinePanel(ax, data, x, y, PATH, _paths.by_shear(data), points=_style.MAX_MARKED_POINTS)
         panel.curves("loading path")
         panel.finish(legend=y is sticking)
     shown[1].set_ylim(0, 105)

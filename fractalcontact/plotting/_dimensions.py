@@ -113,7 +113,8 @@ def _draw_curve(upper: Axes, lower: Axes, name: str, curve: xr.Dataset, fit: xr.
     y = replace(y, width=28)  # the upper panel has two thirds of the height
     slopes = table(curve, "local_slope", dims) if "local_slope" in curve else np.full(y.values.shape, np.nan)
     style = {"color": _style.BLUE, "marker": "." if x.values.size <= _style.MOST_DOTS else ""}
-    above, below = LinePanel(upper, x, y), LinePanel(lower, x, Quantity(slopes, PLAIN, "local slope"))
+    above = LinePanel(upper, curve, x, y, dims)
+    below = LinePanel(lower, curve, x, Quantity(slopes, PLAIN, "local slope"), dims)
     above.line("curve", x.values, y.values, lw=1.2, **style)
     below.line("local slope", x.values, slopes, lw=1.0, **style)
     _slope_limits(lower, slopes)
@@ -208,7 +209,7 @@ def dimensions(
     value, hurst = quantity(data, "fractal_dimension", dims), table(data, "hurst", dims)
     rows = np.arange(len(methods))[::-1]
     size = (_style.PANEL[0], 1.0 + 0.32 * len(methods))
-    panel = LinePanel(_style.axes_or_new(ax, size), value, Quantity(rows, PLAIN, ""))
+    panel = LinePanel(_style.axes_or_new(ax, size), data, value, Quantity(rows, PLAIN, ""), dims)
     embedding = value.values + hurst  # 3 for a surface, 2 for a profile
     low, high = (
         embedding - (table(data, end, dims) if end in data else np.nan) for end in ("ci_high", "ci_low")
@@ -274,7 +275,7 @@ def scaling(result: Any, *, units: Units | None = None, ax: Axes | None = None) 
     """
     dims = ("wavelength",)
     data = result_of(result, ("hurst", "ci_low", "ci_high", *dims, *WINDOW), dims, units)
-    panel = LinePanel.of(ax, data, "wavelength", "hurst", dims, y_name="Hurst exponent", points=0)
+    panel = LinePanel(ax, data, "wavelength", "hurst", dims, y_name="Hurst exponent", points=0)
     wavelength, hurst = panel.x.values, panel.y.values
     points: dict[str, Any] = {"color": _style.ink(), "marker": "o", "ms": 3.5, "lw": 1.0}
     low, high = map(panel.values, ("ci_low", "ci_high"))

@@ -18,7 +18,7 @@ from fractalcontact.base.process import calls_in_two_processes
 from fractalcontact.base.resources import DRAWING_LOCK
 from fractalcontact.base.signals import track
 from fractalcontact.base.study import group_of, member_count
-from fractalcontact.base.validation import Problems, Words, require, writing
+from fractalcontact.base.validation import Problems, Words, require, word_tuple, writing
 from fractalcontact.plotting import (
     _accuracy,
     _closure,
@@ -253,16 +253,14 @@ def draw(
         problems.boolean("progress", progress)
         expected, are_units = UNITS_EXPECTED
         problems.require(units is None or are_units(units), "units", expected, units)
-        are_several = isinstance(formats, (list, tuple)) and bool(formats)
-        if problems.require(are_several, "formats", "a sequence of words", formats):
-            for word in formats:
-                problems.choice("formats", word, FORMATS)
+        if problems.choices("formats", formats, FORMATS):
+            problems.require(len(formats) > 0, "formats", "at least one of them", formats)
     if units is not None:
         with Problems(WHERE):
             require_units([node.to_dataset() for node in tree.subtree], units)
         tree = tree.map_over_datasets(lambda dataset: marked(dataset, units))
     with writing(WHERE, "folder", folder):
-        return _draw_all(tree, Path(folder), (*FIGURES, *_path_figures(tree)), progress, formats)
+        return _draw_all(tree, Path(folder), (*FIGURES, *_path_figures(tree)), progress, word_tuple(formats))
 
 
 def _path_figures(tree: xr.DataTree) -> Iterator[StudyFigure]:

@@ -184,7 +184,7 @@ def _draw_distribution(ax: Any, data: xr.Dataset, name: str) -> LinePanel:
     title = FIRST.get(name, str(data[name].attrs.get("long_name", name)).partition(":")[0])
     rank = np.flatnonzero(np.isfinite(data[name].values))
     data = data.isel({SCAN: rank})
-    panel = LinePanel.of(ax, data, name, Quantity(rank, PLAIN, ""), (SCAN,), x_name=title)
+    panel = LinePanel(ax, data, name, Quantity(rank, PLAIN, ""), (SCAN,), x_name=title)
     x, far = panel.x.values, is_far(panel.x.values)
     if ends := panel.interval(name):
         lines = {"color": _style.BLUE, "lw": _style.THIN, "alpha": 0.6}

@@ -58,7 +58,7 @@ def contact_domains(
     for unused in maps[count:]:
         unused.remove()
     shown = maps[:count]
-    sheet = _style.sheet_of(axes, shown)
+    sheet: Any = None if _style.are_given(axes) else shown[0].get_figure()
     head = [path.common] if sheet is None else []  # no room above the panels of others
     # of the 2.3 inches of a map in a row a load and a share of contact take 1.9 in small letters
     fontsize = "medium" if grid.shape[1] == 1 else "small"
@@ -242,7 +242,7 @@ def _surface(data: xr.Dataset, delta: xr.Dataset | None = None) -> Any:
 
 def _delta_surface(data: xr.Dataset) -> Any:
     last = data.isel(shear=-1) if "shear" in data.dims else data
-    return surface(last, title=f"delta-surface, {_paths.shear_text(last)}".rstrip(", "))
+    return surface(last, title=f"delta-surface, {_paths.shear_text(last, last)}".rstrip(", "))
 
 
 def _along_load(data: xr.Dataset) -> Any:

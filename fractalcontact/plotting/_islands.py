@@ -85,9 +85,8 @@ def _draw_areas(ax: Axes, data: xr.Dataset) -> None:
     labels = [family.labels[i] for i in shown] if family.labels else ()
     family = ordered(labels, family.name, family.unit, len(shown))
     size = Quantity(areas, scale_of(data["area"]), name_of(data["area"]))
-    panel = LinePanel(
-        ax, size, Quantity(np.empty(0), PLAIN, "number of islands of at least this area"), family
-    )
+    number_above = Quantity(np.empty(0), PLAIN, "number of islands of at least this area")
+    panel = LinePanel(ax, data, size, number_above, family=family)
     for i, number in enumerate(shown):
         group = areas[groups[number]]
         ordered_areas = np.sort(group[np.isfinite(group)])[::-1]
@@ -154,7 +153,7 @@ def evolution(
     dims, x, family = _paths.path_axis(data, against)
     shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), sharex=True)
     names = (("n_islands", "number of islands"), ("births", "islands in a step"))
-    left, right = (LinePanel.of(ax, data, x, y, dims, family, y_name=name, points=_style.MAX_MARKED_POINTS)
+    left, right = (LinePanel(ax, data, x, y, dims, family, y_name=name, points=_style.MAX_MARKED_POINTS)
                    for ax, (y, name) in zip(shown, names, strict=True))  # fmt: skip
     left.curves("islands")
     right.curves("births", key="births")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -65,51 +65,35 @@ def distinct(labels: Sequence[str], heading: str = "") -> Family:
     return Family([_style.distinct_style(i) for i in range(len(labels))], labels, heading=heading)
 
 
-@dataclass
 class LinePanel:
     """Axes with the quantities x and y, on which the curves of a family are drawn in their units.
 
     All values are SI; `points` is the most points of a curve that are marked. Variables of `data` are drawn
-    by their names: they are read over `dims`, that of the family and that along the curves.
+    by their names: they are read over `dims`, that of the family and that along the curves. `x_name` and
+    `y_name` replace the names that they have on the axes. The Axes are new ones for None.
     """
 
-    ax: Axes
-    x: Quantity
-    y: Quantity
-    family: Family = field(default_factory=lambda: ordered((), count=1))
-    points: int = 1
-    data: xr.Dataset = field(default_factory=xr.Dataset)
-    dims: tuple[str, ...] = ()
-    entries: list[Any] = field(default_factory=list)
-    drawn: list[tuple[Array, Array]] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        """Label the axes."""
-        self.x.label(self.ax.xaxis)
-        self.y.label(self.ax.yaxis)
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         ax: Axes | None,
         data: xr.Dataset,
         x: str | Quantity,
         y: str | Quantity,
-        dims: tuple[str, ...],
+        dims: tuple[str, ...] = (),
         family: Family | None = None,
         *,
         x_name: str = "",
         y_name: str = "",
         points: int = 1,
-    ) -> LinePanel:
-        """Return the panel of two variables of a result, on new Axes for None.
-
-        `x_name` and `y_name` replace the names that the variables have on the axes.
-        """
+    ) -> None:
         names = ((x, x_name), (y, y_name))
-        across, up = (quantity(data, v, dims, name) if isinstance(v, str) else v for v, name in names)
-        family = ordered((), count=1) if family is None else family
-        return cls(_style.axes_or_new(ax), across, up, family, points, data, dims)
+        self.x, self.y = (quantity(data, v, dims, name) if isinstance(v, str) else v for v, name in names)
+        self.ax, self.data, self.dims, self.points = _style.axes_or_new(ax), data, dims, points
+        self.family = ordered((), count=1) if family is None else family
+        self.entries: list[Any] = []  # of the legend of the kinds of curves
+        self.drawn: list[tuple[Array, Array]] = []
+        self.x.label(self.ax.xaxis)
+        self.y.label(self.ax.yaxis)
 
     def values(self, name: str) -> Array:
         """Return a variable of the result, one row for each of the family."""

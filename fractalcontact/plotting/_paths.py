@@ -93,25 +93,25 @@ def by_shear(data: xr.Dataset) -> Family:
     return ordered(number_texts(scale, data["shear"], 4), "shear $v$", scale.unit)
 
 
-def load_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
+def load_text(state: xr.Dataset, path: xr.Dataset) -> str:
     """Return the load of a state, `F = 30 kN`, in the unit of the path; empty if it is not uniform."""
-    for name in _loads_in_order(state if path is None else path):
+    for name in _loads_in_order(path):
         if name not in state.variables:
             continue
         values = np.atleast_1d(state[name].values).ravel()
         # half a unit of the third digit, the last that the text has, is no difference
         if values.size == 0 or not np.ptp(values) <= 5e-3 * abs(values[0]):
             continue
-        scale = scale_of((state if path is None else path)[name])
+        scale = scale_of(path[name])
         return f"{LOADS[name]} = {float(scale(values[0])):.3g} {scale.unit}".replace("-", "\N{MINUS SIGN}")
     return ""
 
 
-def shear_text(state: xr.Dataset, path: xr.Dataset | None = None) -> str:
+def shear_text(state: xr.Dataset, path: xr.Dataset) -> str:
     """Return the shear of a state, for example `v = 0.4 mm`, in the unit of the path."""
     if "shear" not in state.coords or state["shear"].ndim:
         return ""
-    scale = scale_of((state if path is None else path)["shear"])
+    scale = scale_of(path["shear"])
     return f"$v$ = {float(scale(state['shear'].values)):.4g} {scale.unit}"
 
 

@@ -220,7 +220,7 @@ def _size_curves(
         states = path.states
         over = next(str(last) for last in states[name].dims[::-1] if last not in PATH)
         sizes = sizes_of(states, over)
-        panel = LinePanel.of(ax, states, sizes, name, (dim, over), path.family, y_name=title)
+        panel = LinePanel(ax, states, sizes, name, (dim, over), path.family, y_name=title)
         panel.curves("contact domain")
         _draw_interval(panel, name, has_key=ax is shown[-1])
         if f"null_{name}" in states:
@@ -311,7 +311,7 @@ def _draw_dimension(
 ) -> LinePanel:
     """Draw one curve for each of the family with its random null, its points and, if alone, its interval."""
     load = "shear" if dims[1] == "shear" else _paths.load_of(path) or "coverage"
-    panel = LinePanel.of(ax, path, _paths.loads_of(path, load, dims), name, dims, family, points=0)
+    panel = LinePanel(ax, path, _paths.loads_of(path, load, dims), name, dims, family, points=0)
     x, y = panel.x.values, panel.y.values
     reliable, described = np.full(y.shape, True), "interval wider than 0.5, or none"
     panel.key("contact domain", marker="o")

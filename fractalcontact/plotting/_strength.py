@@ -64,7 +64,7 @@ def strength_envelope(
     pressure = Quantity(pressure.values, strength.scale, pressure.name)
     parts = [name.split("_") for name in words(data["criterion"])]
     authors = distinct([" and ".join(part.capitalize() for part in each) for each in parts])
-    panel = LinePanel.of(ax, data, pressure, strength, dims, authors, points=0)
+    panel = LinePanel(ax, data, pressure, strength, dims, authors, points=0)
     in_range = panel.values("in_range") > 0
     out = ~in_range  # with the last points in range, from which the dots begin
     out[:, 1:] |= ~in_range[:, :-1]
@@ -107,7 +107,7 @@ def shear_curve(
     for ax, name in zip(shown, SHOWN, strict=True):
         x, y = (quantity(data[0], each, data[0][each].dims, shown=every[each])
                 for each in ("shear_displacement", name))  # fmt: skip
-        panel = LinePanel(ax, x, y, family, points=0)
+        panel = LinePanel(ax, data[0], x, y, family=family, points=0)
         for each, own, style in zip(data, of_each, ({}, _style.DASHED), strict=False):
             title = str(each.attrs.get("title", name))
             for i, place in enumerate(own):
@@ -172,7 +172,7 @@ def friction(
     shown = _style.panel_row(axes, len(names), size, sharex=True)
     family, points = (_paths.by_load if by_force else _paths.by_direction)(data), _style.MAX_MARKED_POINTS
     for ax, name in zip(shown, names, strict=True):
-        panel = LinePanel.of(ax, data, "shear", name, (over, "shear"), family, points=points)
+        panel = LinePanel(ax, data, "shear", name, (over, "shear"), family, points=points)
         panel.curves(name.replace("_", " "))
         is_wide = name == "shear_strength" and _style.needs_log_axis(panel.y.values)
         if name == "friction_angle" and "basic_friction_angle" in data:
@@ -217,7 +217,7 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
     strength, shears = quantity(data, "shear_strength", dims), _paths.by_shear(data)
     directions = _paths.by_direction(data)
     coloured = replace(directions, styles=[{"color": style["color"]} for style in directions.styles])
-    panel = LinePanel.of(ax, data, size, strength, dims[1:], coloured)
+    panel = LinePanel(ax, data, size, strength, dims[1:], coloured)
     for i, values in enumerate(strength.values):
         key = shears.labels[i] if shears.labels else ""
         panel.curves(shears.curve("shear strength", i), values, key=key, ls=_style.LINES[i])
@@ -275,7 +275,7 @@ def dilatancy(
 def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     dims = ("direction", "shear")
     data = result_of(data, ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
-    panel = LinePanel.of(ax, data, "shear", "rigid_dilatancy", dims, _paths.by_direction(data))
+    panel = LinePanel(ax, data, "shear", "rigid_dilatancy", dims, _paths.by_direction(data))
     panel.curves("rigid dilatancy")
     if "mean_slope" in data:
         ends = np.array([0.0, np.nanmax(panel.x.values)])
@@ -289,7 +289,7 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
 def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> Axes:
     data = result_of(data, ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
     loads, points, shear = _paths.by_load(data), _style.MAX_MARKED_POINTS, table(data, "shear", ("shear",))
-    panel = LinePanel.of(ax, data, "shear", "dilatancy", ("step", "shear"), loads, points=points)
+    panel = LinePanel(ax, data, "shear", "dilatancy", ("step", "shear"), loads, points=points)
     panel.curves("dilatancy")
     if "rigid_dilatancy" in data:
         style = {"color": _style.ink(), "lw": _style.THIN}
@@ -334,7 +334,7 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     names, dims = ("correlation", "shear", *LENGTHS), ("direction", "shear")
     data = result_of(memory, names, dims, units, "memory")
     family, name = _paths.by_direction(data), "correlation of the faces"
-    panel = LinePanel.of(ax, data, "shear", "correlation", dims, family, y_name=name, points=0)
+    panel = LinePanel(ax, data, "shear", "correlation", dims, family, y_name=name, points=0)
     panel.curves("")
     ends = [table(data.isel(shear=0), name, ("direction",)) for name in LENGTHS]
     for own, low, length, high in zip(panel.family.styles, *ends, strict=True):
@@ -354,7 +354,7 @@ def delta_dimension(result: Any, *, units: Units | None = None, ax: Axes | None 
     shear = quantity(data, "shear", ("shear",))
     values = quantity(data, DIMENSIONS[0], ("shear",), "dimension of the delta-surface")
     methods = distinct([name.split("_")[0] for name in DIMENSIONS], "method")
-    panel = LinePanel.of(ax, data, shear, values, ("shear",), methods)
+    panel = LinePanel(ax, data, shear, values, ("shear",), methods)
     for name, method, own, marker in zip(DIMENSIONS, methods.labels, methods.styles, "osD", strict=True):
         panel.line(method, shear.values, panel.values(name), marker=marker, ms=3.5, **own)
     return panel.finish(log="x" if float(data["shear"].min()) > 0 else "")

@@ -137,15 +137,9 @@ def new_figure(size: tuple[float, float]) -> Any:
 
 
 def figure_of(axes: Any) -> Figure:
-    """Return the figure that Axes, an array of Axes or a dict of Axes belong to."""
-    first = np.ravel(np.asarray(list(axes.values()) if isinstance(axes, dict) else axes, dtype=object))[0]
-    figure: Figure = first.get_figure(root=True)
+    """Return the figure that Axes, or an array of Axes, belong to."""
+    figure: Figure = np.ravel(np.asarray(axes, dtype=object))[0].get_figure(root=True)
     return figure
-
-
-def sheet_of(axes: Panels | None, shown: AxesArray) -> Any:
-    """Return the figure or subfigure of new panels, None where the panels were given."""
-    return None if are_given(axes) else shown.ravel()[0].get_figure()
 
 
 def ink() -> Any:

@@ -166,7 +166,7 @@ def _draw_flow(ax: Axes, data: xr.Dataset, name: str) -> LinePanel:
     values = quantity(data, name, ("axis", *PATH))
     if name == "transmissivity":
         values = Quantity(values.values, FLOW, name)
-    panel = LinePanel(ax, pressure, values, by_shear(data), points=_style.MAX_MARKED_POINTS)
+    panel = LinePanel(ax, data, pressure, values, PATH, by_shear(data), points=_style.MAX_MARKED_POINTS)
     names = [f"along {word}" for word in words(data["axis"])] if "axis" in data.coords else []
     for i, rows in enumerate(values.values):
         kind, line = (names[i], _style.LINES[i % 2]) if names else (values.name, "-")
