@@ -13,7 +13,7 @@ from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import figure
 from fractalcontact.plotting._inputs import (
-    as_dataset,
+    by_name,
     quantity,
     require_dims,
     require_variables,
@@ -23,7 +23,7 @@ from fractalcontact.plotting._inputs import (
 )
 from fractalcontact.plotting._line_panel import Family, LinePanel
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
-from fractalcontact.plotting._units import Units, all_shown_in
+from fractalcontact.plotting._units import Units
 
 MARKERS = "osD^vP*X<>h"  # their number has no common divisor with that of the colours: 77 different styles
 PLANE = ("method", "setting")
@@ -80,16 +80,14 @@ def _widen(ax: Axes, costs: Any, ratio: float = 2.0) -> None:
 
 def _benchmarks(measured: Any, units: Units | None) -> dict[str, xr.Dataset]:
     """Return the results of each benchmark by name."""
-    if isinstance(measured, xr.DataTree) and measured.children:
-        groups = {f"{name}: ": node.to_dataset() for name, node in measured.children.items()}
-    else:
-        groups = {"": as_dataset(measured)}
     benchmarks = {}
-    for prefix, data in all_shown_in(groups, units).items():
+    for group, data in by_name(measured, units).items():
         require_variables(data, MEASURED)
         names = np.asarray(words(data["benchmark"]))
         for name in dict.fromkeys(names.tolist()):
-            benchmarks[f"{prefix}{name}"] = data.isel(method=np.flatnonzero(names == name))
+            benchmarks[f"{group}: {name}" if group else name] = data.isel(
+                method=np.flatnonzero(names == name)
+            )
     return benchmarks
 
 

@@ -20,6 +20,7 @@ from fractalcontact.plotting._inputs import (
     require_dims,
     result_of,
     table,
+    without,
     words,
 )
 from fractalcontact.plotting._line_panel import LinePanel
@@ -163,11 +164,12 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     """
     data = result_of(result, ("fluid_pressure", "uplift_profile", "uplift_x", "uplift_y"), (), units)
     plane = _maps.plane_of(data[["fluid_pressure"]], "fluid_pressure")
-    profile = data["uplift_profile"].squeeze([d for d in data["uplift_profile"].dims if data.sizes[d] == 1
-                                              and d not in ("diagram", "x", "y")])  # fmt: skip
+    profile = data["uplift_profile"]
+    others = [dim for dim in profile.dims if dim not in ("diagram", "x", "y")]
+    profile = without(profile, others, "result.uplift_profile")
+    require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
     names = ("uplift_profile", "uplift_x", "uplift_y", "diagram")
     require_dims(data, dict.fromkeys(names, "diagram"))
-    require(profile.ndim == 2, "result", "uplift_profile of one gap", profile.dims)
     diagrams = words(data["diagram"])
     are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
     require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)

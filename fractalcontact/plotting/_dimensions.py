@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,10 +12,10 @@ from fractalcontact.base.numbers import is_within
 from fractalcontact.base.validation import require
 from fractalcontact.plotting import _style
 from fractalcontact.plotting._figure import StudyFigure, figure
-from fractalcontact.plotting._inputs import as_dataset, quantity, require_dims, result_of, table, words
+from fractalcontact.plotting._inputs import by_name, quantity, require_dims, result_of, table, words
 from fractalcontact.plotting._line_panel import LinePanel
 from fractalcontact.plotting._style import Axes, AxesArray, Panels
-from fractalcontact.plotting._units import PLAIN, Quantity, Units, all_shown_in, scale_of
+from fractalcontact.plotting._units import PLAIN, Quantity, Units, scale_of
 
 SCALES = ("lag", "wavenumber", "cube_size", "window_size", "divider", "box_length", "box_size")
 # log-log slope of each curve: a H + b d + c, with the Hurst exponent H and d = 3 for a surface, 2 for a
@@ -72,15 +71,10 @@ def _curves_in(
     curves: Any, estimates: Any, units: Units | None
 ) -> tuple[dict[str, xr.Dataset], xr.Dataset | None]:
     """Return the scaling curves by name, and the estimates."""
-    if isinstance(curves, xr.DataTree) and curves.children:
-        by_name: Any = {name: node.to_dataset(inherit=False) for name, node in curves.children.items()}
-        estimates = curves.to_dataset() if estimates is None and curves.has_data else estimates
-    else:
-        is_one = not isinstance(curves, Mapping) or isinstance(curves, xr.Dataset | xr.DataTree)
-        by_name = {"": curves} if is_one else curves
-    datasets = {str(name): as_dataset(curve) for name, curve in by_name.items()}
-    datasets = all_shown_in(datasets, units)
-    datasets = {name or curve_of(curve)[1]: curve for name, curve in datasets.items() if curve_of(curve)[1]}
+    if isinstance(curves, xr.DataTree) and curves.children and curves.has_data and estimates is None:
+        estimates = curves.to_dataset()
+    named = by_name(curves, units).items()
+    datasets = {name or curve_of(curve)[1]: curve for name, curve in named if curve_of(curve)[1]}
     require(bool(datasets), "result", f"a variable out of {', '.join(CURVES)}")
     if estimates is not None:
         estimates = result_of(estimates, ESTIMATES, ("method",), argument="estimates")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -11,8 +11,9 @@ import xarray as xr
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import CORE_DIMS
 from fractalcontact.base.validation import NONE, Problems
-from fractalcontact.plotting._units import Quantity, Units, name_of, scale_of, shown_in
+from fractalcontact.plotting._units import Quantity, Units, marked, name_of, require_units, scale_of, shown_in
 
+D = TypeVar("D", xr.Dataset, xr.DataArray)
 MAPS = ("height", "state", "slip_state", "label")
 PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 
@@ -47,17 +48,36 @@ def result_of(
     """
     dataset = shown_in(as_dataset(data, argument), units)
     require_variables(dataset, names, argument)
+    own = {dim for name in names for dim in dataset[name].dims}
+    extra = [dim for dim in dataset.dims if dim in PATH_DIMS and dim not in dims and dim in own]
     with Problems("fc.plotting") as problems:
-        own = {dim for name in names for dim in dataset[name].dims}
-        extra = [dim for dim in dataset.dims if dim in PATH_DIMS and dim not in dims and dim in own]
-        for dim in extra:
-            size = dataset.sizes[dim]
-            problems.require(size == 1, argument, f"one {dim}; choose with .sel or .isel", size)
         for dim in (dim for dim in dims if dim in dataset.variables and dim not in dataset.dims):
             over = dataset[dim].dims  # a variable of this name, as the shear of `direct_shear` over points
             problems.require(not over, argument, f"a result over {dim}", f"one with {dim} over {over}")
-    dataset = dataset.isel(dict.fromkeys(extra, 0))
+        with problems.collect():
+            dataset = without(dataset, extra, argument)
     return dataset.expand_dims([dim for dim in dims if dim not in dataset.dims])
+
+
+def without(data: D, dims: Sequence[Hashable], place: str) -> D:
+    """Return data without some dims, each of which must have length one."""
+    with Problems("fc.plotting") as problems:
+        for dim in dims:
+            size = data.sizes[dim]
+            problems.require(size == 1, place, f"one {dim}; choose with .sel or .isel", size)
+    return data.isel(dict.fromkeys(dims, 0))
+
+
+def by_name(results: Any, units: Units | None) -> dict[str, xr.Dataset]:
+    """Return several results by name: a mapping or the children of a node; one alone has no name."""
+    if isinstance(results, xr.DataTree) and results.children:
+        results = {name: node.to_dataset(inherit=False) for name, node in results.children.items()}
+    is_one = not isinstance(results, Mapping) or isinstance(results, xr.Dataset | xr.DataTree)
+    datasets = {str(name): as_dataset(each) for name, each in ({"": results} if is_one else results).items()}
+    if units is None:
+        return datasets
+    require_units(datasets.values(), units)
+    return {name: marked(dataset, units) for name, dataset in datasets.items()}
 
 
 def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
@@ -108,13 +128,9 @@ def require_known_dims(dataset: xr.Dataset, dims: Mapping[str, Sequence[str]]) -
 
 def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     """Return a variable as an array with exactly `dims`, repeated along those it does not have."""
-    variable = data[name]
-    others = {dim: variable.sizes[dim] for dim in variable.dims if dim not in dims}
-    with Problems("fc.plotting") as problems:
-        for dim, size in others.items():
-            problems.require(size == 1, f"result.{name}", f"one {dim}; choose with .sel or .isel", size)
+    variable = without(data[name], [dim for dim in data[name].dims if dim not in dims], f"result.{name}")
     repeated = {dim: data.sizes.get(dim, 1) for dim in dims if dim not in variable.dims}
-    variable = variable.isel(dict.fromkeys(others, 0)).expand_dims(repeated)
+    variable = variable.expand_dims(repeated)
     return np.asarray(variable.transpose(*dims).values, dtype=np.float64)
 
 

@@ -11,7 +11,7 @@ from fractalcontact.base.numbers import ROUNDED, Array
 from fractalcontact.base.units import Scale, quantity_text, scale_for
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.plotting import _style
-from fractalcontact.plotting._inputs import as_dataset, extent_of
+from fractalcontact.plotting._inputs import as_dataset, extent_of, without
 from fractalcontact.plotting._style import Axes
 from fractalcontact.plotting._units import Quantity, Units, label_axis, name_of, scale_of, shown_in
 
@@ -246,12 +246,9 @@ def plane_of(data: Any, name: str, units: Units | None = None, argument: str = "
             place = f"{argument}.{variable}"
             problems.require({"y", "x"} <= set(plane.dims), place, "dims (y, x)", plane.dims)
             problems.require(plane.dtype.kind in "biuf", place, "real numbers", f"type {plane.dtype}")
-            for dim in plane.dims:
-                if dim not in ("y", "x"):
-                    size = plane.sizes[dim]
-                    problems.require(size == 1, place, f"one {dim}; choose with .sel or .isel", size)
-    plane = dataset[variable]
-    return plane.squeeze([dim for dim in plane.dims if dim not in ("y", "x")]).transpose("y", "x")
+            with problems.collect():
+                plane = without(plane, [dim for dim in plane.dims if dim not in ("y", "x")], place)
+    return plane.transpose("y", "x")
 
 
 def plane_scale(plane: xr.DataArray) -> Scale:

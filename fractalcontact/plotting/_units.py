@@ -75,15 +75,10 @@ UNITS_EXPECTED = ("a dict of variable and unit", _are_units)
 
 def shown_in(data: xr.Dataset, units: Units | None) -> xr.Dataset:
     """Return a result whose variables have the units that a figure is to show them in as an attribute."""
-    return all_shown_in({"": data}, units)[""]
-
-
-def all_shown_in(datasets: dict[str, xr.Dataset], units: Units | None) -> dict[str, xr.Dataset]:
-    """Return the results of one figure, each as `shown_in` does."""
     if units is None:
-        return datasets
-    require_units(datasets.values(), units)
-    return {name: marked(data, units) for name, data in datasets.items()}
+        return data
+    require_units([data], units)
+    return marked(data, units)
 
 
 def require_units(datasets: Iterable[xr.Dataset], units: Units) -> None:
