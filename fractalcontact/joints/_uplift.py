@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -202,7 +202,10 @@ def uplift(
     flow = HeldFlow(grid, wraps, sides, _drain_cells(gap, wraps, points, drain_diameter), drained)
     if total_stress is not None:
         gap = gap.transpose(..., "step", "y", "x")
-        states = _on_path(gap, flow, float(total_stress), (low, drop))
+        paths = np.asarray(gap.values, dtype=np.float64).reshape(-1, *gap.shape[-3:])
+        stresses = _path_stresses(gap).reshape(len(paths), -1)
+        balance = partial(_balanced, flow=flow, total=float(total_stress), water=(low, drop))
+        states = list(map(balance, paths, stresses))
         along = [name for name, coord in gap.coords.items() if "step" in coord.dims]
         gap = gap.isel(step=0).drop_vars(along)
     else:
@@ -423,14 +426,6 @@ def _path_stresses(gap: xr.DataArray) -> Array:
     """Return the effective stress along the path of each gap, shape (..., step)."""
     stress = gap["nominal_pressure"].broadcast_like(gap.isel(y=0, x=0, drop=True)).transpose(..., "step")
     return np.asarray(stress.values, dtype=np.float64)
-
-
-def _on_path(gap: xr.DataArray, flow: HeldFlow, total: float, water: tuple[float, float]) -> list[State]:
-    """Return the state of every gap, dims (..., step, y, x), at which its path balances the total stress."""
-    steps, stresses = gap.sizes["step"], _path_stresses(gap)
-    paths = np.asarray(gap.values, dtype=np.float64).reshape(-1, steps, *gap.shape[-2:])
-    pairs = zip(paths, stresses.reshape(-1, steps), strict=True)
-    return [_balanced(path, stress, flow, total, water) for path, stress in pairs]
 
 
 def _balanced(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -79,7 +79,7 @@ class LinePanel:
         data: xr.Dataset,
         x: str | Quantity,
         y: str | Quantity,
-        dims: tuple[str, ...] = (),
+        dims: Sequence[Hashable] = (),
         family: Family | None = None,
         *,
         x_name: str = "",
@@ -88,7 +88,8 @@ class LinePanel:
     ) -> None:
         names = ((x, x_name), (y, y_name))
         self.x, self.y = (quantity(data, v, dims, name) if isinstance(v, str) else v for v, name in names)
-        self.ax, self.data, self.dims, self.points = _style.axes_or_new(ax), data, dims, points
+        self.ax: Axes = _style.axes_or_new(ax)
+        self.data, self.dims, self.points = data, dims, points
         self.family = ordered((), count=1) if family is None else family
         self.entries: list[Any] = []  # of the legend of the kinds of curves
         self.drawn: list[tuple[Array, Array]] = []
