@@ -9,6 +9,7 @@ smoothed faces refine it. Places where the faces are damaged get little weight.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -127,9 +128,10 @@ def register(
     ]
     offset = (starts[0], starts[1])
     scanned, up = up, turned_over(up, turn_upper)
-    pose = find_pose(low, up, offset, rotation, tilt)
+    fitted = [0, 1, *([2] if rotation else []), 3, *([4, 5] if tilt else [])]  # see `_columns`
+    pose = find_pose(low, up, offset, fitted)
     if not pose.is_certain:
-        _refuse_turned_face(low, scanned, turn_upper, offset, rotation, tilt)
+        _refuse_turned_face(low, scanned, turn_upper, offset, fitted)
     expected = "overlapping faces with relief along both axes, turned by a few degrees at most"
     require(pose.determined, "lower, upper", expected, Words("nothing that fixes the position"))
     moved = resample(up, source_places(pose, low.shape, offset))
@@ -152,12 +154,12 @@ def turned_over(face: Array, axis: str | None) -> Array:
 
 
 def _refuse_turned_face(
-    lower: Array, scanned: Array, given: str | None, offset: Pair, rotates: bool, tilts: bool
+    lower: Array, scanned: Array, given: str | None, offset: Pair, fitted: list[int]
 ) -> None:
     """Raise where the upper face, which does not fit turned over as `given`, fits in another way."""
     for axis in (None, *TURNS):
         turned = turned_over(scanned, axis)
-        if axis != given and find_pose(lower, turned, offset, rotates, tilts).is_certain:
+        if axis != given and find_pose(lower, turned, offset, fitted).is_certain:
             remedy = f"with turn_upper={axis!r} (--turn-upper {axis})" if axis else "without turn_upper"
             problem = "upper: expected faces seen from above, got one scanned face up"
             if given is not None:
@@ -233,12 +235,7 @@ class Pose:
 
 
 def find_pose(
-    lower: Array,
-    upper: Array,
-    offset: Pair,
-    rotates: bool,
-    tilts: bool,
-    smoothing: tuple[float, ...] = (4.0, 2.0, 1.0),
+    lower: Array, upper: Array, offset: Pair, fitted: list[int], smoothing: Sequence[float] = (4.0, 2.0, 1.0)
 ) -> Pose:
     """Return the pose of the upper face.
 
@@ -248,9 +245,9 @@ def find_pose(
         Heights, NaN where missing.
     offset : pair of float
         Place of the first point of `upper` on the grid of `lower`, in cells.
-    rotates, tilts : bool
-        Whether to fit a rotation and a tilt.
-    smoothing : tuple of float
+    fitted : list of int
+        Which of shift y, shift x, angle, height and the two slopes are fitted.
+    smoothing : sequence of float
         Widths of the means, in cells, but no more than a 16th of an edge: an eighth and a 32nd found the same
         places. The last one decides, and suppresses what lies between the points.
     """
@@ -267,7 +264,7 @@ def find_pose(
         # near an edge the mean of fewer heights is noisier, and would pull the edges together; with .8 and
         # .99 16 pairs with noise had the same error within 5 %
         low, up = (smooth(face, min(width, widest), 0.95) for face in (lower, upper))
-        pose = _refine(pose, low, up, offset, rotates, tilts)
+        pose = _refine(pose, low, up, offset, fitted)
         if not pose.determined:
             break
     return replace(pose, slope=(pose.slope[0] * unit, pose.slope[1] * unit))
@@ -348,15 +345,14 @@ def _refine(
     lower: Array,
     upper: Array,
     offset: Pair,
-    rotates: bool,
-    tilts: bool,
+    fitted: list[int],
     *,
     max_steps: int = 40,
     full_steps: int = 10,
     small_step: float = 1e-4,
     settled_step: float = 0.01,
 ) -> Pose:
-    """Take Newton steps on shift, angle, height and slope, with angle and slope only where wanted.
+    """Take Newton steps on the fitted ones of shift, angle, height and slope.
 
     Parameters
     ----------
@@ -364,7 +360,7 @@ def _refine(
         Where to start.
     lower, upper : ndarray
         Smoothed heights.
-    offset, rotates, tilts
+    offset, fitted
         As for `find_pose`.
     max_steps : int
         16 faces, half of them with noise, took 5 to 14 at all widths together.
@@ -379,11 +375,10 @@ def _refine(
     """
     gradients = np.gradient(lower), np.gradient(upper)
     edge = max(lower.shape) / 2
-    used = [0, 1] + ([2] if rotates else []) + [3] + ([4, 5] if tilts else [])
     first = pose.iterations + 1
     for iteration in range(first, first + max_steps):
-        equations = _normal_equations(pose, lower, upper, gradients, offset, edge, used)
-        solved = _newton_step(*equations, used)
+        equations = _normal_equations(pose, lower, upper, gradients, offset, edge, fitted)
+        solved = _newton_step(*equations, fitted)
         if solved is None:
             return replace(pose, determined=False)
         step, errors = solved
@@ -409,13 +404,13 @@ def _normal_equations(
     gradients: Any,
     offset: Pair,
     edge: float,
-    used: list[int],
+    fitted: list[int],
     side: int = 6,  # tiles along an edge; the standard errors change by .4 with 4 and by .15 with 9
 ) -> tuple[Array, Array, float]:
     """Return the equations for the step that brings the difference of the faces to zero, of every tile.
 
-    They are weighted, of shapes (tiles, used, used) and (tiles, used). The last number corrects the standard
-    errors for the robust weights, which change with the residuals.
+    They are weighted, of shapes (tiles, fitted, fitted) and (tiles, fitted). The last number corrects the
+    standard errors for the robust weights, which change with the residuals.
 
     The gradients of the upper face share the noise of the difference, and least squares on them alone would
     be biased. They form the columns; the gradients of the lower face are the instruments that multiply them.
@@ -431,11 +426,11 @@ def _normal_equations(
     weights, error_factor = _robust_weights(columns, target)
     rows_of, columns_of = (np.arange(n) * side // n for n in lower.shape)
     tile, tiles = (rows_of[:, None] * side + columns_of)[observed], side * side
-    matrices, vectors = np.empty((tiles, len(used), len(used))), np.empty((tiles, len(used)))
-    for i, instrument in enumerate(instruments[used]):
+    matrices, vectors = np.empty((tiles, len(fitted), len(fitted))), np.empty((tiles, len(fitted)))
+    for i, instrument in enumerate(instruments[fitted]):
         weighted = instrument * weights
         vectors[:, i] = np.bincount(tile, weighted * target, tiles)
-        for j, column in enumerate(columns[used]):
+        for j, column in enumerate(columns[fitted]):
             matrices[:, i, j] = np.bincount(tile, weighted * column, tiles)
     return matrices, vectors, error_factor
 
@@ -474,7 +469,7 @@ def _has_full_rank(matrix: Array, least: float = 1e-9) -> bool:
 
 
 def _newton_step(
-    matrices: Array, vectors: Array, error_factor: float, used: list[int]
+    matrices: Array, vectors: Array, error_factor: float, fitted: list[int]
 ) -> tuple[Array, Array] | None:
     """Return the step, and standard errors of shift y, shift x and angle from leaving out one tile at a time.
 
@@ -490,6 +485,6 @@ def _newton_step(
     except np.linalg.LinAlgError:
         return None
     step, errors = np.zeros(6), np.full(6, np.nan)
-    step[used] = np.linalg.solve(matrix, vector)
-    errors[used] = np.sqrt((len(estimates) - 1) * estimates.var(axis=0)) * error_factor
+    step[fitted] = np.linalg.solve(matrix, vector)
+    errors[fitted] = np.sqrt((len(estimates) - 1) * estimates.var(axis=0)) * error_factor
     return step, errors[:3]

@@ -53,51 +53,36 @@ def draw_page(
     import matplotlib.style
 
     groups = {name: group_of(tree, f"joints/{name}") for name in GROUPS}
+    envelope, tests, curve = (groups[name] for name in ("strength_envelope", "direct_shear", "shear_curve"))
+    panels: dict[str, Axes] = {}
+    is_sheared = tests is not None or curve is not None
+    title = str(tree.attrs.get("title") or tree.name or "joint")
+    facts = "\n".join([_source(tree), *_input_lines(groups)])
+    limits = list(_limits(groups, notes))[:MOST_LIMITS]
+    # title, strength, shear test (no room without one), stiffness and flow, limits; of a line of 6 points .14
+    ratios = (0.95, max(3.0, 0.14 * len(numbers)), 2.7 if is_sheared else 0.05, 2.5, 0.4 + 0.14 * len(limits))
     page = _style.new_figure(A4) if figure is None else figure
     with matplotlib.style.context(_style.STYLE):  # the text of the page fits at one size only
         page.set_size_inches(A4)
         page.set_layout_engine("constrained", w_pad=0.07, h_pad=0.07)
         page.set_facecolor("white")
-        return _draw_rows(page, tree, groups, numbers, notes)
-
-
-def _draw_rows(
-    page: Figure,
-    tree: xr.DataTree,
-    groups: dict[str, xr.Dataset | None],
-    numbers: Sequence[str],
-    notes: Sequence[str],
-) -> dict[str, Axes]:
-    """Draw the rows of the page; return its panels."""
-    panels: dict[str, Axes] = {}
-    tests, curve = groups["direct_shear"], groups["shear_curve"]
-    is_sheared = tests is not None or curve is not None
-    limits = list(_limits(groups, notes))[:MOST_LIMITS]
-    # title, strength, shear test (no room without one), stiffness and flow, limits; of a line of 6 points .14
-    ratios = (0.95, max(3.0, 0.14 * len(numbers)), 2.7 if is_sheared else 0.05, 2.5, 0.4 + 0.14 * len(limits))
-    parts: Any = page.subfigures(len(ratios), 1, height_ratios=ratios)
-    title = str(tree.attrs.get("title") or tree.name or "joint")
-    parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
-    facts = "\n".join([_source(tree), *_input_lines(groups)])
-    parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
-    left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.05))  # of a line of 74 characters
-    left.text(0.06, 0.96, "\n".join(numbers), size=6.0, family="monospace", va="top", linespacing=1.4)
-    if groups["strength_envelope"] is not None:
-        panels["strength"] = right.add_subplot()
-        _style.style_axes(panels["strength"])
-        strength_envelope(groups["strength_envelope"], tests=groups["direct_shear"], ax=panels["strength"])
-    if is_sheared:
-        beside = curve if tests is not None else None
-        curves = shear_curve(curve if tests is None else tests, beside=beside, axes=parts[2])
-        panels |= zip(("shear stress", "dilatancy"), curves, strict=True)
-    panels |= zip(
-        ("normal stiffness", "mean gap", "transmissivity"),
-        _flow_panels(parts[3], groups["closure"], groups["closure_laws"], groups["transmissivity"]),
-        strict=True,
-    )
-    text = "\n".join(["", "", *limits])
-    parts[4].text(0.03, 1.0, "Limits of validity", size=9, weight="bold", va="top")
-    parts[4].text(0.03, 1.0, text, size=6.0, va="top", linespacing=1.4)
+        parts: Any = page.subfigures(len(ratios), 1, height_ratios=ratios)
+        parts[0].text(0.03, 0.8, title, size=13, weight="bold", va="center")
+        parts[0].text(0.03, 0.58, facts, size=7.5, color=_style.grey(), va="top", linespacing=1.4)
+        left, right = parts[1].subfigures(1, 2, width_ratios=(1.0, 1.05))  # of a line of 74 characters
+        left.text(0.06, 0.96, "\n".join(numbers), size=6.0, family="monospace", va="top", linespacing=1.4)
+        if envelope is not None:
+            panels["strength"] = right.add_subplot()
+            _style.style_axes(panels["strength"])
+            strength_envelope(envelope, tests=tests, ax=panels["strength"])
+        if is_sheared:
+            beside = curve if tests is not None else None
+            curves = shear_curve(curve if tests is None else tests, beside=beside, axes=parts[2])
+            panels |= zip(("shear stress", "dilatancy"), curves, strict=True)
+        flows = _flow_panels(parts[3], groups)
+        panels |= zip(("normal stiffness", "mean gap", "transmissivity"), flows, strict=True)
+        parts[4].text(0.03, 1.0, "Limits of validity", size=9, weight="bold", va="top")
+        parts[4].text(0.03, 1.0, "\n".join(["", "", *limits]), size=6.0, va="top", linespacing=1.4)
     return panels
 
 
@@ -142,14 +127,13 @@ def _input_lines(groups: dict[str, xr.Dataset | None]) -> Iterator[str]:
         yield "assumed: " + "; ".join(texts)
 
 
-def _flow_panels(
-    figure: Any, closure: xr.Dataset | None, laws: xr.Dataset | None, flow: xr.Dataset | None
-) -> AxesArray:
+def _flow_panels(figure: Any, groups: dict[str, xr.Dataset | None]) -> AxesArray:
     """Draw normal stiffness, aperture and transmissivity against the normal stress, one curve per shear."""
     axes: AxesArray = _style.panel_row(figure, 3, A4)
     last = None
-    shown = (("stiffness", laws), ("mean_gap", closure), ("transmissivity", flow))
-    for ax, (name, data) in zip(axes, shown, strict=True):
+    shown = {"stiffness": "closure_laws", "mean_gap": "closure", "transmissivity": "transmissivity"}
+    for ax, (name, group) in zip(axes, shown.items(), strict=True):
+        data = groups[group]
         if data is not None and "nominal_pressure" in data.variables:
             last = _draw_flow(ax, data, name)
         else:
