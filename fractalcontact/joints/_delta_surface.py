@@ -98,11 +98,8 @@ def delta_surface(
     for i, towards in enumerate(directions):
         for j, v in enumerate(shears):
             heights[i, j] = delta_heights(crack, float(v), towards)
-    coords: dict[str, Any] = {
-        "shear": ("shear", shears),
-        **block_coords(crack),
-        **direction_coords(directions),
-    }
+    coords: dict[str, Any] = {"shear": ("shear", shears), **block_coords(crack)}
+    coords |= direction_coords(directions)
     coords["interpolation_error"] = ("direction", "shear"), interpolation_errors(crack, shears, directions)
     result = xr.DataArray(heights, dims=("direction", "shear", "y", "x"), coords=coords, name="height")
     if np.ndim(shear) == 0:
@@ -348,19 +345,14 @@ def delta_dimension(
     flat = heights <= rounding_of(np.asarray(crack.lower.values)[crack.layout.slices])
     rows = [_dimensions(deltas.isel(shear=i), windows, bool(flat[i])) for i in range(shears.size)]
     covering, variogram, spectrum = np.transpose(rows)
-    result = xr.Dataset(
-        {
-            "covering_dimension": ("shear", covering),
-            "variogram_dimension": ("shear", variogram),
-            "spectrum_dimension": ("shear", spectrum),
-            "delta_height": ("shear", heights),
-        },
-        coords={"shear": ("shear", shears), "direction": towards.name, "azimuth": towards.azimuth},
-        attrs={"windows": list(windows)},
-    )
-    for name in ("variogram_dimension", "spectrum_dimension"):
-        result[name].attrs["comment"] = DIFFERENCE_QUOTIENT
-    return result
+    variables = {
+        "covering_dimension": ("shear", covering),
+        "variogram_dimension": ("shear", variogram, {"comment": DIFFERENCE_QUOTIENT}),
+        "spectrum_dimension": ("shear", spectrum, {"comment": DIFFERENCE_QUOTIENT}),
+        "delta_height": ("shear", heights),
+    }
+    coords = {"shear": ("shear", shears), "direction": towards.name, "azimuth": towards.azimuth}
+    return xr.Dataset(variables, coords, {"windows": list(windows)})
 
 
 def _windows(

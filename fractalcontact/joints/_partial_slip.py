@@ -180,22 +180,19 @@ def _pushed(contact: ShearedContact, path: ShearPath, keep: Sequence[str]) -> di
     interface_stiffness = _without_block(of_normal, problem.block_stiffness) / area
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = shear_stiffness / interface_stiffness
-    return (
-        sheared.columns
-        | sheared.maps
-        | {
-            "shear_stiffness": shear_stiffness,
-            "stiffness_ratio": ratio,
-            "interface_stiffness": interface_stiffness,
-            "sliding_force": path.friction * normal,
-            "contact_area": sheared.contact_area,
-            "slip_method": np.int8(solver.METHODS.index(sheared.method)),
-            "superposition_error": sheared.superposition_error,
-            "closure": sheared.normal.closure,
-            "normal_force": normal,
-            "nominal_pressure": normal / problem.grid.nominal_area,
-        }
-    )
+    of_state = {
+        "shear_stiffness": shear_stiffness,
+        "stiffness_ratio": ratio,
+        "interface_stiffness": interface_stiffness,
+        "sliding_force": path.friction * normal,
+        "contact_area": sheared.contact_area,
+        "slip_method": np.int8(solver.METHODS.index(sheared.method)),
+        "superposition_error": sheared.superposition_error,
+        "closure": sheared.normal.closure,
+        "normal_force": normal,
+        "nominal_pressure": normal / problem.grid.nominal_area,
+    }
+    return sheared.columns | sheared.maps | of_state
 
 
 def _block_stiffness(problem: JointProblem, path: ShearPath) -> float:

@@ -134,11 +134,8 @@ def transmissivity(
     (wraps_y, wraps_x), ratio = periodic_axes(periodic, grid), float(grid.spacing[0] / grid.spacing[1])
     wraps = wraps_y, wraps_x
     order = nested_dissection(grid.shape, wraps)
-    flows = [
-        flow
-        for opening in values.reshape(-1, *values.shape[-2:])
-        for flow in gap_flows(opening, ratio, wraps, order, [AXES.index(name) for name in axes])
-    ]
+    openings, numbers = values.reshape(-1, *values.shape[-2:]), [AXES.index(name) for name in axes]
+    flows = [flow for each in openings for flow in gap_flows(each, ratio, wraps, order, numbers)]
     dims, shape = (*leading, "axis"), (*values.shape[:-2], len(axes))
 
     def of_flows(name: str) -> Array:

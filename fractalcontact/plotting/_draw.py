@@ -193,11 +193,8 @@ def _standard_kind(result: Any) -> str:
     for kind, (_, variables) in kinds.items():
         if not names.isdisjoint(variables):
             return kind
-    require(
-        is_one,
-        "result",
-        "one result, scaling curves by name, or all of accuracy.measure; `draw` draws a study",
-    )
+    expected = "one result, scaling curves by name, or all of accuracy.measure; `draw` draws a study"
+    require(is_one, "result", expected)
     return "field" if isinstance(result, xr.DataArray) and {"y", "x"} <= set(result.dims) else "path"
 
 

@@ -56,10 +56,8 @@ def _is_curve(variable: xr.DataArray) -> bool:
 def draw_with_band(drawings: Sequence[Callable[[], Any]], members: int) -> Axes:
     """Draw the median, and for every curve the band between the same curves of the two other drawings."""
     figure, *bounds = (_style.figure_of(drawing()) for drawing in drawings)
-    bands = sum(
-        _add_bands(ax, low, high)
-        for ax, low, high in zip(figure.axes, *(bound.axes for bound in bounds), strict=False)
-    )
+    panels = zip(figure.axes, *(bound.axes for bound in bounds), strict=False)
+    bands = sum(_add_bands(*axes) for axes in panels)
     for bound in bounds:
         bound.clear()
     has_map = any(ax.images or ax.name == "3d" for ax in figure.axes)

@@ -19,11 +19,7 @@ PATH_DIMS = ("member", "direction", "shear", "step", "axis", "method")
 
 
 def result_of(
-    data: Any,
-    names: Sequence[str],
-    dims: Sequence[str],
-    units: Units | None = None,
-    argument: str = "result",
+    data: Any, names: Sequence[str], dims: Sequence[str], units: Units | None = None, argument: str = "result"
 ) -> xr.Dataset:
     """Return a result in which every dim of `dims` exists and no other path dim is left.
 

@@ -217,10 +217,7 @@ NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 
 
 def select_direction(
-    data: Any,
-    direction: str | float | None,
-    units: Units | None = None,
-    argument: str = "result",
+    data: Any, direction: str | float | None, units: Units | None = None, argument: str = "result"
 ) -> xr.Dataset:
     """Return the part of a result that belongs to a direction, a word or an azimuth (None: everything)."""
     dataset = shown_in(as_dataset(data, argument), units)

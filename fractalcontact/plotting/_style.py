@@ -31,14 +31,7 @@ MAP = (4.6, 3.8)  # with one map and its colour bar: a square map has edges of 3
 COLUMNS = 3  # of panels, at most: their axes are 1.7 wide, those of four 1.1, less than the name of an axis
 
 # Okabe and Ito (2008): distinguishable with every kind of colour vision
-ORANGE, SKY, GREEN, BLUE, RED, PURPLE = (
-    "#E69F00",
-    "#56B4E9",
-    "#009E73",
-    "#0072B2",
-    "#D55E00",
-    "#CC79A7",
-)
+ORANGE, SKY, GREEN, BLUE, RED, PURPLE = ("#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00", "#CC79A7")
 COLOURS = (BLUE, RED, GREEN, PURPLE, ORANGE, SKY)
 DIRECTION_COLOURS = {"E": RED, "N": GREEN, "W": BLUE, "S": ORANGE}
 DIRECTION_LINES = {"E": "-", "N": "--", "W": "-", "S": "--"}
