@@ -24,16 +24,6 @@ EDGES = {"W": (1, False), "E": (1, True), "S": (0, False), "N": (0, True)}  # ax
 OPPOSITE = {"W": "E", "E": "W", "S": "N", "N": "S", "x": "E", "y": "N"}
 LARGEST = 1e12  # Pa or m: far beyond water and dams; products do not overflow
 
-BOUNDS: dict[str, dict[str, Any]] = {
-    "upstream_pressure": {"above": 0, "at_most": LARGEST},
-    "downstream_pressure": {"at_least": 0, "at_most": LARGEST},
-    "drain_pressure": {"at_least": 0, "at_most": LARGEST, "optional": True},
-    "drain_diameter": {"at_least": 0},
-    "drain_share": {"at_least": 0, "at_most": 1},
-    "normal_stiffness": {"at_least": 1e3, "optional": True},  # Pa/m: softer joints open by metres
-    "total_stress": {"at_least": POSITIVE["at_least"], "at_most": LARGEST, "optional": True},
-}
-
 FORCES = ("uplift_force", "mean_uplift", "uplift_arm", "uplift_x", "uplift_y", "uplift_profile")
 ON_PATH = ("effective_stress", "balance_error")
 RESULTS = ("diagram", "fluid_pressure", "wet_fraction", "isolated_fraction", "residual", *FORCES, *ON_PATH,
@@ -48,8 +38,14 @@ OFF_THE_PATH = (
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    valid = {name: problems.number(name, **bounds) for name, bounds in BOUNDS.items()}
-    if valid["upstream_pressure"] and valid["downstream_pressure"]:
+    has_high = problems.number("upstream_pressure", above=0, at_most=LARGEST)
+    has_low = problems.number("downstream_pressure", at_least=0, at_most=LARGEST)
+    problems.number("drain_pressure", at_least=0, at_most=LARGEST, optional=True)
+    problems.number("drain_diameter", at_least=0)
+    problems.number("drain_share", at_least=0, at_most=1)
+    problems.number("normal_stiffness", at_least=1e3, optional=True)  # Pa/m: softer joints open by metres
+    problems.number("total_stress", at_least=POSITIVE["at_least"], at_most=LARGEST, optional=True)
+    if has_high and has_low:
         falls = given.downstream_pressure < given.upstream_pressure
         problems.require(falls, "downstream_pressure", "less than upstream_pressure")
     both = given.normal_stiffness is not None and given.total_stress is not None

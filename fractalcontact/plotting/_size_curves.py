@@ -338,13 +338,9 @@ def _draw_dimension(
 
 _lacunarity_maps = functools.partial(lacunarity, maps=True)
 FIGURES = (
-    StudyFigure("box_dimension", "domains/box_dimension", "box_dimension", box_dimension),
+    *(StudyFigure(name, f"domains/{name}", name, box_dimension) for name in DIMENSIONS[:3]),
     StudyFigure("signature", "domains/signature", "local_slope", signature),
     StudyFigure("local_slopes", "domains/box_dimension", "local_slope", signature),
-    StudyFigure("minkowski_dimension", "domains/minkowski_dimension", "minkowski_dimension", box_dimension),
-    StudyFigure(
-        "correlation_dimension", "domains/correlation_dimension", "correlation_dimension", box_dimension
-    ),
     StudyFigure("lacunarity", "domains/lacunarity", "lacunarity", lacunarity),
     StudyFigure(
         "lacunarity_maps", "domains/lacunarity", "lacunarity", _lacunarity_maps, ("step", "box_size")
