@@ -36,11 +36,8 @@ INTERVALS = (
 NO_STIFFNESS = "NaN where there is no force, where a branch of the path has one step only, or nothing closes"
 FITS = ("closure_length", "reference_pressure", "exponential_misfit", "initial_stiffness",
         "greatest_closure", "hyperbolic_misfit")  # fmt: skip
-ENDS = tuple(
-    f"{name}_{end}"
-    for name in ("closure_length", "reference_pressure", "initial_stiffness", "greatest_closure")
-    for end in ("low", "high")
-)
+# of the intervals of the four constants; the misfits have none
+ENDS = tuple(f"{name}_{end}" for name in (*FITS[:2], *FITS[3:5]) for end in ("low", "high"))
 PREFERENCE = (
     "neither: the scatter about the better law is over 5% of the range of the closures; undecided: fewer "
     "than 6 loading steps, or abs(law_score) within the 99% interval of Student"

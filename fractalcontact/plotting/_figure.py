@@ -90,21 +90,18 @@ def figure(function: Callable[P, R]) -> Callable[P, R]:
     return wrapper
 
 
-def _is_one_of(*names: str) -> Test:
-    """Return a test for the classes of matplotlib, which are not loaded before something is drawn."""
+def _is_axes(value: Any) -> bool:
+    from matplotlib.axes import Axes
 
-    def test(value: Any) -> bool:
-        return any(f"{cls.__module__}.{cls.__name__}" in names for cls in type(value).__mro__)
-
-    return test
-
-
-_is_axes, _is_sheet = _is_one_of("matplotlib.axes._axes.Axes"), _is_one_of("matplotlib.figure.FigureBase")
+    return isinstance(value, Axes)
 
 
 def _are_panels(value: Any) -> bool:
-    several = isinstance(value, (list, tuple, np.ndarray))
-    return _is_sheet(value) or (several and all(map(_is_axes, np.ravel(np.asarray(value, dtype=object)))))
+    from matplotlib.figure import FigureBase
+
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return all(map(_is_axes, np.ravel(np.asarray(value, dtype=object))))
+    return isinstance(value, FigureBase)
 
 
 def _are_numbers(value: Any) -> bool:

@@ -18,7 +18,6 @@ from fractalcontact.plotting._inputs import (
     as_dataset,
     quantity,
     require_dims,
-    require_variables,
     result_of,
     table,
 )
@@ -82,7 +81,7 @@ def signature(
     require(data.sizes[over] > 0, f"result.{over}", "at least one entry")
     for name in nulls[:1]:
         _, dim, constant, sign = NULLS[name]
-        require_variables(data, [dim])
+        require_dims(data, {dim: dim})
         slope = constant + sign * local_slope(data[dim].values, data[name].values)
         data = data.assign(null_local_slope=(data[name].dims, slope))
     panels = path_panels(axes, data)
