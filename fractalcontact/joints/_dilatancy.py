@@ -15,7 +15,7 @@ from fractalcontact.base.schema import DEFAULT_TOLERANCE
 from fractalcontact.base.study import BORRI_BRUNETTO_1998
 from fractalcontact.base.validation import Problems
 from fractalcontact.joints._crack import Crack, check_sliding
-from fractalcontact.joints._delta_surface import delta_heights, interpolation_errors
+from fractalcontact.joints._delta_surface import heights_under, interpolation_errors, missing_heights
 from fractalcontact.joints._sheared_contact import (
     CONTACT_OPTIONS,
     PRESS_BYTES,
@@ -159,8 +159,16 @@ def _rigid_dataset(crack: Crack, shears: Array, directions: Sequence[Direction])
 
 def rigid_dilatancies(crack: Crack, shears: Array, directions: Sequence[Direction]) -> tuple[Array, float]:
     """Return the rigid dilatancy, shape (direction, shear), and the separation that it counts from, m."""
-    initial = float(delta_heights(crack, 0.0, directions[0]).max())
-    highest = [
-        [delta_heights(crack, float(shear), towards).max() for shear in shears] for towards in directions
-    ]
-    return np.array(highest) - initial, initial
+    (lower, upper), layout = crack.faces(), crack.layout
+    difference = np.empty(layout.cells)  # one array for all of them: of small blocks a new one takes as long
+
+    def highest(shear: float, towards: Direction) -> float:
+        under = heights_under(lower, layout, layout.shift(shear, towards.unit))
+        height = float(np.subtract(under, upper, out=difference).max())
+        if not np.isfinite(height):
+            raise missing_heights(crack, towards, shear)
+        return height
+
+    initial = highest(0.0, directions[0])
+    lifted = [[highest(float(shear), towards) for shear in shears] for towards in directions]
+    return np.array(lifted) - initial, initial
