@@ -350,7 +350,8 @@ def test_size_of_tests_and_coverage(case, hurst):
     for name in ("isotropy_p_value", "anisotropy_p_value"):
         assert within_binomial_bounds((result[name] < 0.05).sum(), result[name].count(), 0.05).all()
     is_defined = np.isfinite(result["anisotropy_ratio_low"])
-    assert float(is_defined.mean()) > 0.95  # not where the exponent is within three standard errors of none
+    # not where the exponent is within three standard errors of none: .085 of 48 x 48 points with H = .1
+    assert float(is_defined.mean()) > (0.9 if (case, hurst) == ("small", 0.1) else 0.95)
     assert within_binomial_bounds(
         (result["anisotropy_ratio_low"] == 1.0).where(is_defined).sum(), is_defined.sum(), 0.95
     ).all()
