@@ -44,6 +44,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     SPREAD,
     Known,
     Posterior,
+    decay,
     posterior,
 )
 from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
@@ -444,8 +445,9 @@ def fit_azimuths(
         found = posterior(bins, known, pilot_spread=float(spectrum.theta[SPREAD]))
         fits, share = [], np.zeros_like(found.share)
         for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE):
-            theta = found.theta[m, int(np.argmax(found.share[m]))]
-            each = replace(spectrum, theta=theta, form=found.hypotheses[m].form)
+            k = int(np.argmax(found.share[m]))
+            peak = found.hypotheses[m], found.discrepancies[k], found.theta[m, k]
+            each = replace(spectrum, theta=peak[2], form=peak[0].form, decay=decay(bins, *peak))
             fits.append((*classes.fit_metric(each), m))
         least = min(fit[2] for fit in fits)
         for *_, deviance, m in fits:

@@ -114,8 +114,7 @@ _STEEP = 2.0**300  # slope beyond which the area is proportional to the heights
 
 
 def _check_covering(problems: Problems) -> None:
-    reserved = (*_NAMES.values(), "cube_size", "pair_count", "vertical_scale", *ALWAYS)
-    check_surface(problems, reserved=reserved)
+    check_surface(problems, reserved=(*_NAMES.values(), "cube_size", "pair_count", "vertical_scale", *ALWAYS))
     problems.number("vertical_scale", above=0, at_least=1e-50, at_most=1e50)
 
 

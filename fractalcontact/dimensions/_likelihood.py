@@ -33,6 +33,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     SPREAD,
     Known,
     Posterior,
+    decay,
     posterior,
 )
 from fractalcontact.dimensions._surface_input import Scales, Surface, between
@@ -178,9 +179,7 @@ def _residuals(bins: Bins, found: Posterior) -> tuple[Array, Array]:
     """
     hypothesis, discrepancy, theta = found.most_probable
     residuals = bins.level - bins.log_power(theta[None], hypothesis.form)[0][0]
-    if math.isinf(discrepancy.length):
-        q = discrepancy.scatter
-        residuals -= np.polyfit(q, residuals, 1, w=bins.variance**-0.5)[0] * q
+    residuals -= decay(bins, *found.most_probable) * np.exp(bins.lnq)
     return residuals[discrepancy.inside], 1.0 / bins.variance[discrepancy.inside]
 
 

@@ -70,12 +70,15 @@ class MetricSpectrum:
         Components (u, v) of the metric, see `metric_of`.
     dy : float
         Spacing along y; that along x is one.
+    decay : float
+        Of the logarithm with the wavenumber, `_spectral_posterior.decay`.
     """
 
     theta: Array
     form: int
     log_ratio: Array
     dy: float
+    decay: float = 0.0
 
     @cached_property
     def metric(self) -> Array:
@@ -103,6 +106,8 @@ class MetricSpectrum:
         if spread > 0.0 and self.form == FILTERED:
             for s, q in ((spread / self.dy, y * self.dy), (spread, x)):
                 total *= np.square(AxisBlur(q.ravel()).transfers(s)[1].reshape(q.shape))
+        if self.decay:
+            total *= np.exp(self.decay * np.hypot(y, x))
         gammas = math.gamma(1.0 + hurst) / math.gamma(1.0 - hurst)
         total *= 2.0 ** (2.0 * hurst + 1.0) * np.pi * hurst * gammas / self.dy
         return np.asarray(np.maximum(total, 1e-300))

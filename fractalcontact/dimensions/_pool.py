@@ -24,7 +24,6 @@ SOURCE = (
     "Sidik and Jonkman, Statistics in Medicine 21 (2002) 3153-3159"
 )
 FEWER = "fewer than two scans have an interval"
-MODELS = ("random", "common")
 ESTIMATES = "results of fractalcontact.dimensions.estimate, or one along `scan`"
 SURFACES = "surfaces, whose likelihoods are multiplied"
 DISAGREE = 1e-3  # probability of chi square from which on scans have no common exponent
@@ -33,7 +32,7 @@ NEEDED = ("hurst", "standard_error", "fractal_dimension", "scale_min", "scale_ma
 
 def _check(problems: Problems) -> None:
     given = problems.given
-    is_common = problems.choice("model", among=MODELS) and given.model == "common"
+    is_common = problems.choice("model", among=("random", "common")) and given.model == "common"
     expected = SURFACES if is_common else ESTIMATES
     several = _listed(given.scans)
     problems.require(bool(several), "scans", expected, NONE)
@@ -46,9 +45,8 @@ def _check(problems: Problems) -> None:
         elif problems.result("scans", each) and isinstance(given.method, str):
             problems.choice("method", among=[str(name) for name in each["method"].values])
     expected = "None (a common exponent is that of the likelihood)" if is_common else "a name"
-    problems.require(
-        given.method is None or (isinstance(given.method, str) and not is_common), "method", expected
-    )
+    is_name = isinstance(given.method, str) and not is_common
+    problems.require(given.method is None or is_name, "method", expected)
 
 
 def _is_one(scan: Any, is_common: bool) -> bool:
@@ -132,8 +130,7 @@ def pool(scans: Any, method: str | None = None, *, model: str = "random") -> xr.
     hurst, error = found.hurst[used], found.error[used]
     wholes = np.unique(found.whole[used])
     with Problems("fractalcontact.dimensions.pool") as problems:
-        expected = "those of surfaces or of profiles"
-        problems.require(wholes.size <= 1, "scans", expected, Words("those of both"))
+        problems.require(wholes.size <= 1, "scans", "all of surfaces or of profiles", Words("those of both"))
     whole = float(wholes[0]) if wholes.size else np.nan
     from scipy.special import chdtri
 
@@ -188,10 +185,8 @@ def _of_results(results: list[xr.Dataset], method: str | None) -> _Scans:
         return np.concatenate([np.asarray(each[name].values, dtype=float).ravel() for each in chosen])
 
     hurst = values("hurst")
-    whole = np.rint(hurst + values("fractal_dimension"))
-    return _Scans(
-        hurst, values("standard_error"), whole, values("scale_min"), values("scale_max"), [], np.zeros(0)
-    )
+    error, whole = values("standard_error"), np.rint(hurst + values("fractal_dimension"))
+    return _Scans(hurst, error, whole, values("scale_min"), values("scale_max"), [], np.zeros(0))
 
 
 def _of_surfaces(surfaces: list[xr.DataArray]) -> _Scans:

@@ -208,6 +208,14 @@ class Posterior:
         return float(np.sum(share * theta) / share.sum()) if share.sum() > LEVEL else math.nan
 
 
+def decay(bins: Bins, hypothesis: Hypothesis, discrepancy: Discrepancy, theta: Array) -> float:
+    """Return -a of a filter of first order beside a maximum, 0 without one."""
+    if math.isfinite(discrepancy.length):
+        return 0.0
+    residual = bins.level - bins.log_power(theta[None], hypothesis.form)[0][0]
+    return float(np.polyfit(np.exp(bins.lnq), residual, 1, w=bins.variance**-0.5)[0])
+
+
 def mixture_interval(
     share: Array, centre: Array, scale: Array, *, points: int = 161, rounds: int = 4
 ) -> Interval:

@@ -158,8 +158,7 @@ SOURCE = (
 
 def _check_lacunarity(problems: Problems) -> None:
     problems.choice("mass", among=("range", "sum"))
-    reserved = ("lacunarity", "window_size", "pair_count", *ALWAYS)
-    check_surface(problems, reserved=reserved)
+    check_surface(problems, reserved=("lacunarity", "window_size", "pair_count", *ALWAYS))
 
 
 @public_result(

@@ -158,5 +158,8 @@ def test_a_point_spread_with_long_tails_leaves_the_exponent(hurst):
     assert float(result.ci_low) < hurst < float(result.ci_high)
     assert float(result.ci_high - result.ci_low) < 0.3
     assert "no Gaussian" in str(result.note.values)
+    along = fc.dimensions.directions(surface(seen))
+    assert ((along.ci_low < hurst) & (hurst < along.ci_high)).all()  # without the filter .77 for .3
+    assert float(along.isotropy_p_value) > 0.001
     blurred = fc.dimensions.estimate(surface(ndimage.gaussian_filter(height, 0.7)))
     assert "no Gaussian" not in str(blurred.note[0].values)
