@@ -437,16 +437,17 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e4) -> tuple[Array,
 
 
 def _log_weakening(bins: Bins, residual: Array) -> Array:
-    """Return the logarithm of the probability that a filter of first order weakens waves, over one half.
+    """Return the logarithm of the probability that a filter of first order weakens waves.
 
-    That it strengthens them is the other half of its normal distribution, and impossible.
+    That it strengthens them is impossible, so that its prior probability is half of a departure. With all of
+    it means over the area of a point scatter by .129 about H = .9, with half by .095, a quarter .080.
     """
     from scipy.special import log_ndtr
 
     q, weight = np.exp(bins.lnq), 1.0 / bins.variance
     weight = weight * (q - weight @ q / weight.sum())
     precision = 1.0 + weight @ q
-    return np.asarray(math.log(2.0) + log_ndtr(-residual @ weight / math.sqrt(precision)))
+    return np.asarray(log_ndtr(-residual @ weight / math.sqrt(precision)))
 
 
 @lru_cache

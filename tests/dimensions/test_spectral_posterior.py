@@ -122,10 +122,10 @@ def test_joint_interval_of_one_surface_is_its_own():
 
 
 def test_a_filter_of_first_order_only_weakens():
-    """Beside levels that rise with the wavenumber it is impossible, beside falling ones twice as probable."""
+    """Beside levels that rise with the wavenumber it is impossible, beside falling ones certain."""
     bins = bins_of(0.5)
     steps = np.array([[0.5], [0.0], [-0.5]]) * np.exp(bins.lnq)
     rising, even, falling = np.exp(sp._log_weakening(bins, steps + 3.0))  # the amplitude does not matter
     assert rising < 1e-6
-    assert even == pytest.approx(1.0)
-    assert falling == pytest.approx(2.0)
+    assert even == pytest.approx(0.5)
+    assert falling == pytest.approx(1.0)
