@@ -27,15 +27,16 @@ the right, in words, where it differs:
          over p < p_max) / scale
     (3)  free set I_c: 0 < p < p_max, and where admitted the nodes   p > 0; overlapping nodes are given the
          outside that violate the conditions                         pressure -tau g at the end of the step
-    (4)  z = M (g - mean g) on I_c, less its mean under force        z = g - mean g
-         control
-    (5)  G = sum z g; beta = G / G_old while the set does not        beta = delta G / G_old, delta = 0 after
-         change, else 0                                              nodes overlapped, else 1
+    (4)  under force control z = M (g - mean g) on I_c, less its     z = g - mean g
+         mean; under closure control z = M g, on a periodic body
+         with the uniform pressure that closes the mean gap
+    (5)  G = sum z g; beta = G / G_old while the set hardly          beta = delta G / G_old, delta = 0 after
+         changes, else 0                                             nodes overlapped, else 1
     (6)  t = z + beta t on I_c, 0 elsewhere
     (7)  r = K t                                                     less the mean of r over I_c
     (8)  tau = sum t g / sum t r
     (9)  p = p - tau t, projected onto 0 <= p <= p_max, with the     projected onto 0 <= p
-         force restored by a factor
+         force restored by a factor, under a bound p_max by a shift
     (10) u = u - tau r where nothing was projected, else u = K p     u = K p anew
          anew
 
@@ -45,7 +46,7 @@ Differences from the paper:
   transform, and the residual (2), which bounds the error.
 - The closure (1) is the mean of u + h weighted by the pressure, where the paper subtracts the plain mean gap
   over I_c. At the solution both are the closure; before it, the weighted mean makes sum p g vanish over
-  p < p_max. The plain mean of g is still subtracted in (4).
+  p < p_max. Under force control the plain mean of g is still subtracted in (4).
 - No mean of r is subtracted for (8): under force control t adds up to zero, so that a constant in r does not
   change sum t r.
 

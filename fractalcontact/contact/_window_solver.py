@@ -11,9 +11,10 @@ Under force control the closure is not known beforehand. Solved on too few nodes
 large; so either no other node lies below it, and the candidates are verified, or the nodes below it are a
 sufficient set.
 
-Single precision first saves a quarter of the time at n = 512 and nothing at n = 256, where the transforms fit
-the caches either way. Each precision compiles all passes of the iteration once, so that small surfaces, the
-usual size of a block that is slid, take double precision alone and start in half the time.
+Single precision first saves a tenth to a quarter of the time from n = 512 on, and at n = 256, where the
+transforms fit the caches either way, a seventh at most. Each precision compiles all passes of the iteration
+once, so that small surfaces, the usual size of a block that is slid, take double precision alone and start in
+half the time.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from fractalcontact.contact._problem import Body, Control, Problem, Solution
 Window = tuple[slice, slice]
 
 WHOLE_PLANE = (slice(None), slice(None))
-# nodes from which single precision first saves a tenth of the time and more; at 384 x 384 it saves less than
-# its kernels, which double precision does not share, take to compile (3 s)
+# nodes from which single precision first saves a tenth to a quarter of the time; at 384 x 384 it saves less
+# than its kernels, which double precision does not share, take to compile (3 s)
 SINGLE_FROM = 512 * 512
 # candidates for this much more than the expected closure; 1.02 and 1.3 took the same time at light loads
 CLOSURE_MARGIN = 1.1
@@ -120,7 +121,10 @@ class WindowSolver:
         return replace(solution, pressure=np.where(tiny & is_open, 0.0, pressure))
 
     def state_of(self, solution: Solution) -> Array:
-        """Return the state of `PastStep`; one node alone moves by its pressure times the spacing, to 4 %."""
+        """Return the state of `PastStep`, with the spacing for the compliance of a node by itself.
+
+        On square cells that is 0.89 to 1.15 spacings, by the kind of influence coefficients.
+        """
         state = self.problem.gap + solution.displacement
         state -= solution.closure
         state /= -np.sqrt(self.problem.body.spacing[0] * self.problem.body.spacing[1])
