@@ -169,8 +169,8 @@ def _preferred_law(state: xr.Dataset) -> str:
         return (
             f"exponential, l {_with_ends(state, 'closure_length', scale_for('m', state['closure_length']))}"
         )
-    misfits = (length(state[f"{word}_misfit"]) for word in ("exponential", "hyperbolic"))
-    return f"{names[0]}, misfits {', '.join(misfits)}"
+    misfits = (f"{word} {length(state[f'{word}_misfit'])}" for word in ("exponential", "hyperbolic"))
+    return f"{names[0]}, misfits: {', '.join(misfits)}"
 
 
 def _with_ends(state: xr.Dataset, name: str, scale: Scale) -> str:

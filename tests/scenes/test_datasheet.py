@@ -9,6 +9,7 @@ from matplotlib.text import Text
 from plotting_figures import figure_of, render
 
 import fractalcontact as fc
+from fractalcontact.base.units import quantity_text
 
 
 @pytest.fixture(scope="module")
@@ -152,6 +153,10 @@ def test_closure_laws_are_drawn_and_named(tree, monkeypatch):
     np.testing.assert_allclose(line.get_ydata(), own["stiffness"].isel(shear=1) / 1e9)
     np.testing.assert_allclose(line.get_xdata(), pressure / 1e6)
     assert "undecided, misfits" in texts(page)  # three steps
+    whole = fc.scenes.summary(both, verbose=True)
+    for state in (own.isel(shear=0), own.isel(shear=1)):
+        one, other = (quantity_text(state[f"{law}_misfit"], "m") for law in ("exponential", "hyperbolic"))
+        assert f", misfits: exponential {one}, hyperbolic {other}" in whole
     assert "seating pressure" not in texts(page)  # from first touch
 
 
