@@ -404,7 +404,7 @@ STAGES = (
         Column("peak shear strength", _strength("peak_shear_strength")),
         Column("peak friction angle", _strength("peak_friction_angle")),
         Column("from shear", _strength("peak_shear"), screen=False),
-        Column("over", _peak_distance),
+        Column("slope over", _peak_distance),
         remarks=_peak_remarks,
         needs=("joints/elastic_dilatancy or joints/rigid_dilatancy",),
         takes="result",

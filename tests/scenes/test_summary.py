@@ -517,7 +517,8 @@ def test_zero_lengths_have_a_unit_of_their_size():
     rigid["rigid_dilatancy"] = rigid["rigid_dilatancy"].copy(data=[np.sqrt(np.arange(9)) * 1e-5])
     friction = fc.joints.friction(rigid, distance=2e-4, nominal_pressure=1e6)
     tree = xr.DataTree.from_dict({"joints/friction": friction})
-    assert rows(tree, "peak shear strength")[0]["from shear"] == "0 mm"
+    (row,) = rows(tree, "peak shear strength")
+    assert (row["from shear"], row["slope over"]) == ("0 mm", "200 µm")
 
 
 def test_reason_of_states_without_a_dimension_belongs_to_one_of_them():
