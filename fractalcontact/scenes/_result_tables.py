@@ -151,6 +151,8 @@ def table_of(rows: Rows, tree: xr.DataTree, data: xr.Dataset) -> ResultTable | N
         key_heads.append(KEYS.get(dim, (rows.load if dim == "step" else dim).replace("_", " ")))
         key_heads[-1] += along if dim == "step" else ""
         key_cells.append(values)
+    if "shear" in keys[:1] and "direction" in data.coords and data["direction"].ndim == 0:
+        key_heads[0] += f" to {direction_text(data['direction'].values)}"
     has_load = {"step", "nominal_pressure"} & set(others) and "nominal_pressure" in data.coords and key_heads
     if has_load and are_one(finite(data["nominal_pressure"])):
         key_heads[0] += f", at {amount(data['nominal_pressure'])}"

@@ -65,7 +65,7 @@ def test_ensemble_is_written_drawn_and_summarised(ensemble, compliance, tmp_path
     tree, folder = ensemble
     assert list((folder / "out").glob("*.png"))
     (head,) = (line for line in fc.scenes.summary(tree).splitlines() if "interface closure" in line)
-    assert head.startswith("shear, at 1.74 MPa ")
+    assert head.startswith("shear to W, at 1.74 MPa ")
     for path in ("joints/closure", "joints/friction", "domains/box_dimension", "dimensions"):
         tree[path].to_dataset().to_netcdf(tmp_path / "one.nc")
         assert compliance(tmp_path / "one.nc") == [], path
