@@ -97,7 +97,9 @@ def _openings(tree: xr.DataTree) -> Iterator[str]:
         f"; rigid, the faces first touch with the upper one lifted by {length(-smallest)}, at a mean "
         f"aperture of {length(mean - smallest)}"
     )
-    yield f"aperture: mean {length(mean)}, smallest {length(smallest)}" + (lifted if smallest < 0.0 else "")
+    place = "in mated position" if "shift_x" in tree["joints/faces"] else "as given"
+    opening = f"aperture {place}: mean {length(mean)}, smallest {length(smallest)}"
+    yield opening + (lifted if smallest < 0.0 else "")
 
 
 def _tables(tree: xr.DataTree) -> Iterator[ResultTable]:

@@ -137,6 +137,7 @@ def test_joint_with_a_spike_as_scanned(scans):
         spiked
     )
     words = " ".join(fc.scenes.summary(spiked, verbose=True).split())
+    assert "aperture as given: mean " in words
     assert "a mean aperture of 1 mm" in words
     assert re.search(r"the faces first touch at a mean aperture of \S+ \S+, not 1 mm", words)
     assert "stand out" not in fc.scenes.summary(without)
@@ -286,7 +287,7 @@ def test_scan_on_itself_shows_zeros_and_no_rounding(tmp_path, capsys):
     command = ["joint", *[str(tmp_path / "face.nc")] * 2, "--young", "30GPa", "-o", str(tmp_path / "out")]
     assert main([*command, "--verbose"]) == 0
     out = capsys.readouterr().out
-    assert "aperture: mean 0 m, smallest 0 m\n" in out
+    assert "aperture in mated position: mean 0 m, smallest 0 m\n" in out
     assert "fm" not in out
     assert "rotation 0 °" in " ".join(out.split())
 
