@@ -95,8 +95,9 @@ def _signature_window(
         yield f"{len(reasons)} of {data['reason'].size} states have no dimension{of_which}: {reasons[-1]}."
 
 
-def _evolution_window(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield what holds for its dimensions, unless the table of the signature, which has the same, says it."""
+def _evolution_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield what is counted, and what holds for dimensions where no table of the signature says it."""
+    yield "Births, deaths, merges and splits are those since the state before on the path of load or shear."
     if group_of(tree, SIGNATURE) is None:
         yield from _signature_window(tree, data, others="")
 
@@ -198,7 +199,7 @@ STAGES = (
         Column("merges", "merges", 0),
         Column("splits", "splits", 0),
         Column("D (random spots)", _window_dimension, screen=False),
-        remarks=_evolution_window,
+        remarks=_evolution_remarks,
         needs=(SIGNATURE,),
         whole_path=True,
     ),

@@ -542,6 +542,8 @@ def test_window_of_the_signature_is_said_once_and_where_its_columns_are():
     )
     assert both.count("D is over") == both.count("; clustering and patches at") == 1
     assert alone.count("D is over") == 1
+    for words in (both, alone):  # since which state the islands are counted
+        assert words.count("splits are those since the state before") == 1
     assert "patches" not in alone
 
 
