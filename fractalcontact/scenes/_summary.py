@@ -467,7 +467,8 @@ def _true_pressure(tree: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterato
         times = f", by a factor of up to {number(factor, 3)}" if factor > 1.005 else ""
         yield (
             f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {span} GPa: "
-            f"elastic contact areas are too small{times}; a hardness limits the pressure."
+            f"elastic contact areas are too small{times}, and so are closures under a load; a hardness "
+            "limits the pressure."
         )
 
 

@@ -81,9 +81,17 @@ def test_yield_pressure_of_the_stated_material_is_used(rough):
     assert "concrete" not in caveats
 
 
+def test_yield_makes_areas_and_closures_greater(rough):
+    hard = fc.contact.press(GRID_NOISE, contact_modulus=1e9, nominal_pressure=[1e5, 1e6, 1e7], hardness=2e7)
+    assert (hard.contact_fraction > 1.4 * rough.contact_fraction).all()
+    assert (hard.closure > 1.2 * rough.closure).all()
+    assert "and so are closures under a load" in text(study(rough, yield_pressure=2e7))
+    assert "closures under a load" not in text(study(hard, yield_pressure=2e7))
+
+
 def test_factor_of_yield_is_not_rounded_to_one(rough):
     highest = float((rough.nominal_pressure / rough.contact_fraction).max())
-    assert "too small, by a factor of up to 1.03;" in text(study(rough, yield_pressure=highest / 1.03))
+    assert "too small, by a factor of up to 1.03, and" in text(study(rough, yield_pressure=highest / 1.03))
     assert "yields" not in text(study(rough, yield_pressure=highest * (1 - 1e-12)))
 
 
