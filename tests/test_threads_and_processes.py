@@ -36,6 +36,8 @@ r = fc.domains.box_dimension(s > s.quantile(0.7), box_sizes=[1, 2, 100, 150], va
 print(r.null_count.values.tolist(), float(r.null_dimension), float(r.null_spread))
 """,
     "transmissivity": """
+from fractalcontact.joints import _network_pressure
+_network_pressure.DIRECT_CELLS = 100  # beyond: by multigrid
 s = fc.surfaces.fbm((200, 200), 1e-4, hurst=0.8, rms_increment=1e-6, rng=1)
 r = fc.joints.transmissivity((s - s.quantile(0.2)).clip(0).drop_vars('quantile').assign_attrs(units='m'))
 print(r.transmissivity.values.tolist(), r.residual.values.tolist())
