@@ -444,10 +444,9 @@ def fit_azimuths(
         bins = replace(classes.bins(spectrum), noise=known.total_noise)
         found = posterior(bins, known, pilot_spread=float(spectrum.theta[SPREAD]))
         fits, share = [], np.zeros_like(found.share)
-        for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE):
-            k = int(np.argmax(found.share[m]))
-            peak = found.hypotheses[m], found.discrepancies[k], found.theta[m, k]
-            each = replace(spectrum, theta=peak[2], form=peak[0].form, decay=decay(bins, *peak))
+        for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE).tolist():
+            hypothesis, _, theta = peak = found.peak(m)
+            each = replace(spectrum, theta=theta, form=hypothesis.form, decay=decay(bins, *peak))
             fits.append((*classes.fit_metric(each), m))
         least = min(fit[2] for fit in fits)
         for *_, deviance, m in fits:

@@ -123,9 +123,8 @@ def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -
 def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, known: Known) -> Estimate:
     """Return the record of a posterior, with what was found in words."""
     low, middle, high, deviation = found.interval()
-    discrepancy = found.most_probable[1]
     dx, unit = surface.spacing[1], first.scale * surface.unit
-    inside = np.exp(-bins.lnq[discrepancy.inside]) * 2.0 * np.pi * dx
+    inside = np.exp(-bins.lnq[found.most_probable[1].inside]) * 2.0 * np.pi * dx
     amplitude = math.sqrt(max(_amplitude(bins, found), 0.0))
     spread = found.named(SPREAD) * dx
     height = amplitude * unit * found.named(NOISE) if known.noise is None else math.nan
@@ -179,7 +178,7 @@ def _residuals(bins: Bins, found: Posterior) -> tuple[Array, Array]:
     """
     hypothesis, discrepancy, theta = found.most_probable
     residuals = bins.level - bins.log_power(theta[None], hypothesis.form)[0][0]
-    residuals -= decay(bins, *found.most_probable) * np.exp(bins.lnq)
+    residuals -= decay(bins, hypothesis, discrepancy, theta) * np.exp(bins.lnq)
     return residuals[discrepancy.inside], 1.0 / bins.variance[discrepancy.inside]
 
 

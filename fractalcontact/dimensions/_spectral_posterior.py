@@ -18,12 +18,13 @@ normal, and
 
 where delta is what (1) does not hold: nothing; a process of standard deviation tau, correlated over an
 octave; the fourth order in q of a filter that is no Gaussian; its first order, as that of a lens or of a
-point spread with long tails, -a q with a > 0, half of a normal number of the deviation of a spacing; or a cut
-q_c beyond which the bins say nothing, with a process that grows to it as (q / q_c)^2 (short waves) or
-(q_c / q)^2 (long waves).
+point spread with long tails, -a q, where a has a normal prior with the deviation of one spacing; or a cut q_c
+beyond which the bins say nothing, with a process that grows to it as (q / q_c)^2 (short waves) or (q_c / q)^2
+(long waves).
 
 Noise, a blur, a corner, sampling without aliases, a process, a first order and a cut are departures from an
-exact surface, independent of each other; all but noise have the same prior probability.
+exact surface, independent of each other. They have the same prior probability, but for noise, which has more,
+and a first order, of which the half with a < 0, stronger short waves, is impossible.
 
 For each combination of nuisances and each kind of discrepancy the maximum is found by Gauss-Newton steps in
 unit normal variables u (the maxima, where the model holds), and Laplace's method gives its evidence and a
@@ -144,7 +145,8 @@ class Discrepancy:
     inside : ndarray of bool, shape (bins,)
     prior : float
     length : float
-        Octaves over which it is correlated; infinite where one number multiplies all bins.
+        Octaves over which it is correlated; infinite of a filter of first order, whose number multiplies all
+        bins.
     """
 
     scatter: Array
@@ -198,7 +200,11 @@ class Posterior:
     @property
     def most_probable(self) -> tuple[Hypothesis, Discrepancy, Array]:
         """Hypothesis, discrepancy and theta of the largest share."""
-        m, k = np.unravel_index(int(np.argmax(self.share)), self.share.shape)
+        return self.peak(int(np.argmax(self.share.max(axis=1))))
+
+    def peak(self, m: int) -> tuple[Hypothesis, Discrepancy, Array]:
+        """Return the hypothesis m, with the discrepancy and theta of its largest share."""
+        k = int(np.argmax(self.share[m]))
         return self.hypotheses[m], self.discrepancies[k], self.theta[m, k]
 
     def named(self, parameter: int) -> float:

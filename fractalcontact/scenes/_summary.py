@@ -462,11 +462,11 @@ def _true_pressure(tree: xr.DataTree, path: str, pressed: xr.Dataset) -> Iterato
     low, high = (number(float(end) / 1e9, 3) for end in (true.min(), true.max()))
     limits = scene_table(tree, "material").get("yield_pressure")
     if limits is not None and float(true.max()) > 1.005 * np.min(limits):  # seen with three digits
-        span = " to ".join(number(float(limit) / 1e9, 3) for limit in np.atleast_1d(limits))
+        limit = span(limits, lambda pressure: number(pressure / 1e9))
         factor = float(true.max()) / float(np.max(limits))
         times = f", by a factor of up to {number(factor, 3)}" if factor > 1.005 else ""
         yield (
-            f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {span} GPa: "
+            f"{path}: the true mean pressure is {low} to {high} GPa, and the material yields at {limit} GPa: "
             f"elastic contact areas are too small{times}, and so are closures under a load; a hardness "
             "limits the pressure."
         )
