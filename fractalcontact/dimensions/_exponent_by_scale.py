@@ -197,5 +197,4 @@ def _fitted(bins: Bins, logs: Array, chosen: Array) -> tuple[float, float, float
     limit = here + NORMAL**2
     low = float(np.interp(-limit, -chi_square[: k + 1], _EXPONENTS[: k + 1]))
     high = float(np.interp(limit, chi_square[k:], _EXPONENTS[k:]))
-    hurst = float(_EXPONENTS[k] + step * np.clip(shift, -1.0, 1.0))
-    return hurst, low, high
+    return float(_EXPONENTS[k] + step * np.clip(shift, -1.0, 1.0)), low, high

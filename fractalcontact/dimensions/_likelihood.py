@@ -164,7 +164,7 @@ def _findings(found: Posterior, bins: Bins, dx: float, spread: float, height: fl
         lengths = 2.0 * np.pi * dx * np.exp(-bins.lnq[discrepancy.inside])
         ends = quantity_text(float(lengths.min()), "m"), quantity_text(float(lengths.max()), "m")
         notes.append(f"one exponent describes the waves from {ends[0]} to {ends[1]} only")
-    elif math.isinf(discrepancy.length):
+    elif discrepancy.is_filter:
         notes.append("a filter that is no Gaussian blur changes the short waves")
     elif discrepancy.scatter.max() > 0.0:
         share = 100.0 * float(discrepancy.scatter.max())

@@ -144,15 +144,14 @@ class Discrepancy:
     scatter : ndarray, shape (bins,)
     inside : ndarray of bool, shape (bins,)
     prior : float
-    length : float
-        Octaves over which it is correlated; infinite of a filter of first order, whose number multiplies all
-        bins.
+    is_filter : bool
+        Of first order: one number times the scatter, in place of a process correlated over an octave.
     """
 
     scatter: Array
     inside: Array
     prior: float
-    length: float = 1.0
+    is_filter: bool = False
 
 
 class Interval(NamedTuple):
@@ -216,7 +215,7 @@ class Posterior:
 
 def decay(bins: Bins, hypothesis: Hypothesis, discrepancy: Discrepancy, theta: Array) -> float:
     """Return -a of a filter of first order beside a maximum, 0 without one."""
-    if math.isfinite(discrepancy.length):
+    if not discrepancy.is_filter:
         return 0.0
     residual = bins.level - bins.log_power(theta[None], hypothesis.form)[0][0]
     return float(np.polyfit(np.exp(bins.lnq), residual, 1, w=bins.variance**-0.5)[0])
@@ -339,34 +338,26 @@ def posterior(
     ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, _PRIOR_SHARPNESS
     prior = np.array(ranges).T
     whitening, constants = map(np.stack, zip(*(_whitening(kind, bins) for kind in kinds), strict=True))
-    form = np.array([hypothesis.form for hypothesis in chosen])
-    fixed = np.array([hypothesis.theta for hypothesis in chosen])
+    fit = _Fit(
+        bins, prior, np.array([each.form for each in chosen]), np.array([each.theta for each in chosen])
+    )
     # the first kind of discrepancy has several maxima, each other kind the one near its best start, or near
     # the best of the first kind
-    starts = np.where(np.isnan(fixed)[:, None], _starting_points(), 0.0)
-    residual = _residuals(bins, prior, form, fixed, starts)
-
-    def maxima(starts: Array, residual: Array, kind: Array, attempts: int) -> tuple[Array, Array, Array]:
-        white = residual @ whitening[kind][:, None].transpose(0, 1, 3, 2)
-        squares = np.square(white).sum(axis=3) + np.square(starts).sum(axis=2)
-        best = np.argsort(squares, axis=2)[:, :, :attempts].transpose(1, 0, 2).reshape(len(starts), -1)
-        near = np.take_along_axis(starts, best[:, :, None], 1)
-        kind = kind.repeat(attempts)
-        return _maxima(bins, prior, form, fixed, whitening[kind], constants[kind], near)
-
     first = attempts[is_pilot]
-    several = maxima(starts, residual, np.zeros(1, dtype=int), first)
+    starts = np.where(np.isnan(fit.fixed)[:, None], _starting_points(), 0.0)
+    residual = fit.residual(starts)
+    several = fit.maxima(_best(starts, residual, whitening[:1], first), whitening[:1], constants[:1])
     best = np.take_along_axis(several[0], np.argmin(several[1], axis=1)[:, None, None], 1)
     starts = np.concatenate([starts, best], axis=1)
-    residual = np.concatenate([residual, _residuals(bins, prior, form, fixed, best)], axis=1)
-    others = maxima(starts, residual, np.arange(1, len(kinds)), 1)
+    residual = np.concatenate([residual, fit.residual(best)], axis=1)
+    others = fit.maxima(_best(starts, residual, whitening[1:], 1), whitening[1:], constants[1:])
     u, objective, hessian = (np.concatenate(pair, axis=1) for pair in zip(several, others, strict=True))
-    theta = _theta(u, fixed[:, None], prior)
     of_kind = np.r_[np.zeros(first, dtype=int), 1 : len(kinds)]
+    found = [kinds[k] for k in of_kind]
     prior_of = np.array([hypothesis.log_prior for hypothesis in chosen])[:, None] + constants[of_kind]
     evidence = prior_of - 0.5 * objective - 0.5 * np.linalg.slogdet(hessian)[1]
-    for k in np.flatnonzero([math.isinf(kinds[k].length) for k in of_kind]):
-        evidence[:, k] += _log_weakening(bins, _residuals(bins, prior, form, fixed, u[:, [k]])[:, 0])
+    for k in np.flatnonzero([kind.is_filter for kind in found]):
+        evidence[:, k] += _log_weakening(bins, fit.residual(u[:, [k]])[:, 0])
     # two attempts within one standard deviation of the prior are one maximum: with .1 and 2 widths are the
     # same within 6 %
     distance = np.square(u[:, :first, None] - u[:, None, :first]).sum(axis=3)
@@ -374,7 +365,7 @@ def posterior(
     scale = np.sqrt(np.linalg.inv(hessian)[:, :, HURST, HURST])
     share = np.exp(evidence - evidence.max())
     share /= share.sum()
-    return Posterior(share, u[:, :, HURST], scale, theta, chosen, [kinds[k] for k in of_kind])
+    return Posterior(share, u[:, :, HURST], scale, fit.theta(u), chosen, found)
 
 
 def _discrepancies(
@@ -416,7 +407,7 @@ def _discrepancies(
         Discrepancy(np.full(octaves.size, tau), everything, uncut * DEPARTURE / len(_TAUS)) for tau in _TAUS
     ]
     if first_order:
-        kinds.append(Discrepancy(q, everything, smooth * first_order, math.inf))
+        kinds.append(Discrepancy(q, everything, smooth * first_order, is_filter=True))
     if has_fourth:
         kinds.append(Discrepancy(fourth, everything, holds))
     return kinds + [Discrepancy(scatter, inside, (1.0 - uncut) / len(cuts)) for scatter, inside in cuts]
@@ -431,7 +422,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e4) -> tuple[Array,
     """
     octaves = bins.lnq / _OCTAVE
     inside = np.ix_(kind.inside, kind.inside)
-    correlation = np.exp(-np.abs(octaves[:, None] - octaves) / kind.length)
+    correlation = 1.0 if kind.is_filter else np.exp(-np.abs(octaves[:, None] - octaves))
     covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
     lower = np.linalg.cholesky(covariance[inside] + (0.0 if bins.noise > 0.0 else flat))
     whitening = np.zeros(covariance.shape)
@@ -471,102 +462,138 @@ def _starting_points(number: int = 64) -> Array:
     return np.asarray(ndtri(np.clip((0.5 + np.outer(np.arange(number), steps)) % 1.0, 0.02, 0.98)))
 
 
-def _theta(u: Array, fixed: Array, prior: Array) -> Array:
-    """Return theta of unit normal numbers, where it is not fixed."""
-    from scipy.special import ndtr
-
-    low, high = prior
-    theta = low + (high - low) * ndtr(u)
-    theta[..., CORNER] = np.exp(theta[..., CORNER])
-    for k in (SPREAD, NOISE, SHARPNESS):
-        theta[..., k] = np.exp(low[k] + high[k] * u[..., k])
-    theta = np.where(np.isnan(fixed), theta, fixed)
-    # p of (1). Of a corner with .2 the slope turns over 16 octaves; wider ones, with .01, gave 2 of 16
-    # surfaces of white noise an exponent above .08
-    difference = np.minimum(np.abs(theta[..., LONG_HURST] - theta[..., HURST]), 1.0)
-    theta[..., SHARPNESS] = np.hypot(theta[..., SHARPNESS] * difference, 0.2)
-    # a corner below half of 1 / s: an octave of waves between corner and blur shows H
-    theta[..., CORNER] /= 1.0 + 2.0 * theta[..., SPREAD] * theta[..., CORNER]
-    return theta
-
-
-def _residuals(bins: Bins, prior: Array, form: Array, fixed: Array, u: Array) -> Array:
-    """Return the logarithms of the bins less those expected, shape (hypotheses, points, bins)."""
-    theta = _theta(u, fixed[:, None], prior)
-    model = bins.log_power(theta.reshape(-1, theta.shape[-1]), form.repeat(u.shape[1]))[0]
-    return np.asarray((bins.level - model).reshape(*u.shape[:2], -1))
-
-
-def _maxima(
-    bins: Bins,
-    prior: Array,
-    form: Array,
-    fixed: Array,
-    whitening: Array,
-    constants: Array,
-    start: Array,
-    *,
-    evaluations: int = 30,
-    least_gain: float = 1e-3,
-    longest: float = 2.0,
-    step: float = 1e-4,
-) -> tuple[Array, Array, Array]:
-    """Return the maxima of the posterior near some starting points u, shape (hypotheses, points, 6).
-
-    Damped Gauss-Newton steps (Levenberg and Marquardt), of all points together. Returned are u, the sum of
-    the squares of the white residuals and of u, and half its second derivatives, without those of the model.
+def _best(starts: Array, residual: Array, whitening: Array, number: int) -> Array:
+    """Return the points with the least sums of squares, shape (hypotheses, kinds x number, 6).
 
     Parameters
     ----------
-    bins, prior, form, fixed
-        See `posterior`.
-    whitening, constants : ndarray, shape (points, bins, bins) and (points,)
-        Of the kind of discrepancy of each point, see `_whitening`.
-    start : ndarray
-    evaluations, least_gain : int, float
-        Of a point; expected gain, times the share it would have, below which a point rests. With 150 and 1e-6
-        in their place the ends of 306 intervals move by .01 of their width (median; .2 in one of 100).
-    longest : float
-        Of a step.
-    step : float
-        Of the numerical derivative of theta.
+    starts : ndarray, shape (hypotheses, points, 6)
+    residual : ndarray, shape (hypotheses, points, bins)
+    whitening : ndarray, shape (kinds, bins, bins)
+    number : int
+        Of each kind of discrepancy.
     """
-    shape, identity = start.shape, np.eye(start.shape[2])
-    steps = step * np.concatenate([np.zeros((1, start.shape[2])), identity])
-    form, fixed = form.repeat(shape[1]), fixed.repeat(shape[1], axis=0)
-    start, kind = start.reshape(-1, shape[2]), np.tile(np.arange(shape[1]), shape[0])
-    u, objective = start.copy(), np.full(len(start), np.inf)
-    hessian, gradient = np.empty((*start.shape, start.shape[1])), np.empty(start.shape)
-    damping, rejected = np.zeros(len(start)), np.zeros(len(start), dtype=np.int64)
-    active, trial = np.arange(len(start)), start
-    for _ in range(evaluations):
-        points = _theta(trial[:, None] + steps, fixed[active][:, None], prior)
+    white = residual @ whitening[:, None].transpose(0, 1, 3, 2)
+    squares = np.square(white).sum(axis=3) + np.square(starts).sum(axis=2)
+    best = np.argsort(squares, axis=2)[:, :, :number].transpose(1, 0, 2).reshape(len(starts), -1)
+    return np.take_along_axis(starts, best[:, :, None], 1)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Some bins under several hypotheses, at points u whose six numbers have unit normal priors.
+
+    Attributes
+    ----------
+    bins : Bins
+    prior : ndarray, shape (2, 6)
+        Ends of each of theta, or mean and deviation of its logarithm.
+    form : ndarray of int, shape (hypotheses,)
+    fixed : ndarray, shape (hypotheses, 6)
+        Values of theta, NaN where it is free.
+    """
+
+    bins: Bins
+    prior: Array
+    form: Array
+    fixed: Array
+
+    def theta(self, u: Array) -> Array:
+        """Return theta of points u, shape (hypotheses, points, 6)."""
+        from scipy.special import ndtr
+
+        low, high = self.prior
+        theta = low + (high - low) * ndtr(u)
+        theta[..., CORNER] = np.exp(theta[..., CORNER])
+        for k in (SPREAD, NOISE, SHARPNESS):
+            theta[..., k] = np.exp(low[k] + high[k] * u[..., k])
+        theta = np.where(np.isnan(self.fixed[:, None]), theta, self.fixed[:, None])
+        # p of (1). Of a corner with .2 the slope turns over 16 octaves; wider ones, with .01, gave 2 of 16
+        # surfaces of white noise an exponent above .08
+        difference = np.minimum(np.abs(theta[..., LONG_HURST] - theta[..., HURST]), 1.0)
+        theta[..., SHARPNESS] = np.hypot(theta[..., SHARPNESS] * difference, 0.2)
+        # a corner below half of 1 / s: an octave of waves between corner and blur shows H
+        theta[..., CORNER] /= 1.0 + 2.0 * theta[..., SPREAD] * theta[..., CORNER]
+        return theta
+
+    def residual(self, u: Array) -> Array:
+        """Return the logarithms of the bins less those expected, shape (hypotheses, points, bins)."""
+        theta = self.theta(u)
+        model = self.bins.log_power(theta.reshape(-1, theta.shape[-1]), self.form.repeat(u.shape[1]))[0]
+        return np.asarray((self.bins.level - model).reshape(*u.shape[:2], -1))
+
+    def linearised(self, u: Array, *, step: float = 1e-4) -> Array:
+        """Return the residual of a point u of each hypothesis, and less its derivatives.
+
+        Those by theta are exact, of theta by u differences over a `step`; shape (hypotheses, 7, bins).
+        """
+        points = self.theta(u[:, None] + step * np.eye(7, 6, -1))
         theta = points[:, 0]
-        model, slopes = bins.log_power(theta, form[active], slopes=True)
+        model, slopes = self.bins.log_power(theta, self.form, slopes=True)
         change = (points[:, 1:] - points[:, :1]) / step
         change[..., CORNER] /= np.maximum(theta[:, CORNER], 1e-300)[:, None]
-        rows = np.concatenate([(bins.level - model)[:, None], change @ slopes], axis=1)
-        rows = rows @ whitening[kind[active]].transpose(0, 2, 1)
-        residual, jacobian = rows[:, 0], rows[:, 1:]
-        total = np.square(residual).sum(axis=1) + np.square(trial).sum(axis=1)
-        gain = objective[active] - total
-        better = gain > 0.0
-        now = active[better]
-        u[now], objective[now] = trial[better], total[better]
-        hessian[now] = jacobian[better] @ jacobian[better].transpose(0, 2, 1) + identity
-        gradient[now] = (jacobian[better] @ residual[better, :, None])[:, :, 0] - trial[better]
-        damping[active] = np.where(better, 0.2 * damping[active], np.maximum(0.1, 5.0 * damping[active]))
-        rejected[active] = np.where(better, 0, rejected[active] + 1)
-        active = active[rejected[active] < 6]
-        damped = hessian[active] * (1.0 + damping[active, None, None] * identity)
-        move = np.linalg.solve(damped, gradient[active][:, :, None])[:, :, 0]
-        gain = (move * gradient[active]).sum(axis=1)
-        evidence = constants[kind] - 0.5 * objective
-        share = np.exp(np.minimum(evidence[active] - evidence.max() + gain, 0.0))
-        is_far = gain * share > least_gain
-        active, move = active[is_far], move[is_far]
-        if active.size == 0:
-            break
-        move *= longest / np.maximum(np.abs(move).max(axis=1, keepdims=True), longest)
-        trial = u[active] + move
-    return u.reshape(shape), objective.reshape(shape[:2]), hessian.reshape(*shape, shape[2])
+        return np.concatenate([(self.bins.level - model)[:, None], change @ slopes], axis=1)
+
+    def maxima(
+        self,
+        start: Array,
+        whitening: Array,
+        constants: Array,
+        *,
+        evaluations: int = 30,
+        least_gain: float = 1e-3,
+        longest: float = 2.0,
+    ) -> tuple[Array, Array, Array]:
+        """Return the maxima of the posterior near some starting points u, shape (hypotheses, points, 6).
+
+        Damped Gauss-Newton steps (Levenberg and Marquardt), of all points together. Returned are u, the sum
+        of the squares of the white residuals and of u, and half its second derivatives, without those of the
+        model.
+
+        Parameters
+        ----------
+        start : ndarray
+            For each kind of discrepancy as many points.
+        whitening, constants : ndarray, shape (kinds, bins, bins) and (kinds,)
+            See `_whitening`.
+        evaluations, least_gain : int, float
+            Of a point; expected gain, times the share it would have, below which a point rests. With 150 and
+            1e-6 in their place the ends of 306 intervals move by .01 of their width (median; .2 in one of
+            100).
+        longest : float
+            Of a step.
+        """
+        shape, identity = start.shape, np.eye(start.shape[2])
+        hypothesis, place = np.indices(shape[:2]).reshape(2, -1)
+        kind = place // (shape[1] // len(whitening))
+        trial = start.reshape(-1, shape[2])
+        u, objective, active = trial.copy(), np.full(len(trial), np.inf), np.arange(len(trial))
+        hessian, gradient = np.empty((*u.shape, shape[2])), np.empty(u.shape)
+        damping, rejected = np.zeros(len(u)), np.zeros(len(u), dtype=np.int64)
+        for _ in range(evaluations):
+            at = hypothesis[active]
+            rows = replace(self, form=self.form[at], fixed=self.fixed[at]).linearised(trial)
+            rows = rows @ whitening[kind[active]].transpose(0, 2, 1)
+            residual, jacobian = rows[:, 0], rows[:, 1:]
+            total = np.square(residual).sum(axis=1) + np.square(trial).sum(axis=1)
+            gain = objective[active] - total
+            better = gain > 0.0
+            now = active[better]
+            u[now], objective[now] = trial[better], total[better]
+            hessian[now] = jacobian[better] @ jacobian[better].transpose(0, 2, 1) + identity
+            gradient[now] = (jacobian[better] @ residual[better, :, None])[:, :, 0] - trial[better]
+            damping[active] = np.where(better, 0.2 * damping[active], np.maximum(0.1, 5.0 * damping[active]))
+            rejected[active] = np.where(better, 0, rejected[active] + 1)
+            active = active[rejected[active] < 6]
+            damped = hessian[active] * (1.0 + damping[active, None, None] * identity)
+            move = np.linalg.solve(damped, gradient[active][:, :, None])[:, :, 0]
+            gain = (move * gradient[active]).sum(axis=1)
+            evidence = constants[kind] - 0.5 * objective
+            share = np.exp(np.minimum(evidence[active] - evidence.max() + gain, 0.0))
+            is_far = gain * share > least_gain
+            active, move = active[is_far], move[is_far]
+            if active.size == 0:
+                break
+            move *= longest / np.maximum(np.abs(move).max(axis=1, keepdims=True), longest)
+            trial = u[active] + move
+        return u.reshape(shape), objective.reshape(shape[:2]), hessian.reshape(*shape, shape[2])

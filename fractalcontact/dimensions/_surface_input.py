@@ -70,8 +70,7 @@ class Surface:
     @property
     def raw(self) -> Array:
         """Heights in m, shape (ny, nx)."""
-        data = self.stack.variable.data[self.index]
-        return np.asarray(data, dtype=np.float64).reshape(self.shape)
+        return np.asarray(self.stack.variable.data[self.index], dtype=np.float64).reshape(self.shape)
 
     def with_heights(self, heights: Array) -> Surface:
         """Return a surface with other scaled heights in the same unit."""

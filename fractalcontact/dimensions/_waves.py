@@ -94,8 +94,7 @@ def waves(surface: xr.DataArray) -> xr.Dataset:
     >>> print(f"{float(result.wavelength[0]):.1e} m at {float(result.wave_azimuth[0]):.0f} degrees")
     5.0e-05 m at 53 degrees
     """
-    found = [find_waves(single)[0] for single in read_surfaces(surface)]
-    return _dataset(surface, found)
+    return _dataset(surface, [find_waves(single)[0] for single in read_surfaces(surface)])
 
 
 @dataclass(frozen=True, eq=False)
