@@ -104,7 +104,8 @@ def _of_azimuths(surface: Surface, first: FirstFit, window: Scales, known: Known
 def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate:
     """Return the estimate from cosine modes, or from the Fourier modes of a periodic surface."""
     fit = first.modes
-    if fit is None:
+    # modes of a surface with gaps tell less than as many of a complete one
+    if fit is None or np.sum(fit.information * fit.keep) < LEAST:
         return undefined(NO_MODES)
     keep = fit.keep & between(2.0 * np.pi / fit.lattice.q, window)
     number, least = int(np.count_nonzero(keep)), LEAST * LEAST_BINS

@@ -163,3 +163,14 @@ def test_a_point_spread_with_long_tails_leaves_the_exponent(hurst):
     assert float(along.isotropy_p_value) > 0.001
     blurred = fc.dimensions.estimate(surface(ndimage.gaussian_filter(height, 0.7)))
     assert "no Gaussian" not in str(blurred.note[0].values)
+
+
+@pytest.mark.parametrize(
+    ("points", "missing", "is_known"), [(59, 0.991, False), (24, 0.9, False), (48, 0.7, True)]
+)
+def test_few_points_of_a_large_map_leave_no_exponent(points, missing, is_known):
+    """Of 59 x 59 points 31 were there: the power of their modes overflowed."""
+    heights = fc.surfaces.fbm((points, points), 1e-4, hurst=0.5, rms_increment=1e-6, rng=1)
+    found = fc.dimensions.estimate(heights.where(np.random.default_rng(2).random(heights.shape) > missing))
+    assert np.isfinite(found.ci_low.item()) == is_known
+    assert ("too few modes" in found.reason.item()) != is_known
