@@ -192,17 +192,10 @@ class Progress:
 class ConstrainedCG:
     """One run of the iteration.
 
-    The arrays are h, p, u, t, the modes inside a transform, and `work_array`, which holds several things in
-    turn, so that a solution takes less than eight arrays beyond the heights:
-
-        step                     p                     work_array
-        (1) to (3)               pressure              last p if its step was projected, else of no use
-        (4) to (6)               pressure              z, in half of it if that is double precision (a free
-                                                       body has a wider plane for z, `wide`)
-        (7) to (10)              p - tau t             r = K t
-        (9), (10) projected      projected p - tau t   p before the step: the two arrays are swapped
-
-    Going back from a projected step swaps the two again, and takes half the step in the same way.
+    The arrays are h, p, u, t, the modes inside a transform, and one of these three, each of which is let go
+    before the next is made: z in (4) to (6), r in (7) to (10) of a step within the bounds, and `last_p`, the
+    pressure before a projected step, until the objective has not risen. A solution then takes less than eight
+    arrays beyond the heights.
     """
 
     def __init__(self, system: ContactSystem, control: Control, start: Array) -> None:
@@ -219,13 +212,11 @@ class ConstrainedCG:
         self.p = np.zeros(shape, dtype=self.dtype)  # pressure
         self.u = RELEASED  # displacement, see `update_displacement`
         self.t = np.zeros(shape, dtype=self.dtype)  # search direction
-        self.work_array = np.zeros(shape, dtype=self.dtype)  # see the table above
+        self.last_p: Array | None = None  # before the last step, where that left the bounds and was projected
         plane, dtype = self.preconditioner.plane_shape, self.preconditioner.dtype
-        self.wide = None if plane == shape else np.zeros(plane, dtype)
         self.free_set = FreeSet.empty(plane, self.preconditioner.bin_shape, dtype)
         self.tau, self.G = 0.0, 0.0
         self.updates = 0  # steps that the displacement has followed since it was computed, u = K p
-        self.projected = False  # the last step left the bounds and was projected
         self.halvings = 0  # of the last step
         self.last_objective = np.inf
         np.clip(start, 0, self.p_max, out=self.p, casting="same_kind")
@@ -251,7 +242,7 @@ class ConstrainedCG:
             if self.overshot(evaluation, progress):
                 self.backtrack()
                 continue
-            self.last_objective, self.halvings, self.projected = evaluation.objective, 0, False
+            self.last_objective, self.halvings, self.last_p = evaluation.objective, 0, None
             inside, outside, residual = self.kkt_residual(evaluation)  # (2)
             if residual <= tolerance:
                 if not certify or self.displacement_is_exact(evaluation, tolerance):
@@ -420,13 +411,9 @@ class ConstrainedCG:
         shift = self.dtype(free.g / free.count if self.force_controlled else 0.0)
         unit = self.dtype(np.sqrt(free.g2 / free.count)) or self.dtype(1)
         bin_columns, free_set = self.preconditioner.bin_columns, self.free_set
-        plane = self.wide
-        if plane is None:
-            plane = np.frombuffer(self.work_array, self.preconditioner.dtype, self.h.size)
-            plane = plane.reshape(self.h.shape)
-        else:  # the margin of a free body
-            plane[self.h.shape[0] :] = 0
-            plane[:, self.h.shape[1] :] = 0
+        plane = np.empty(self.preconditioner.plane_shape, self.preconditioner.dtype)
+        plane[self.h.shape[0] :] = 0  # the margin of a free body
+        plane[:, self.h.shape[1] :] = 0
         state = (self.h, self.u, self.p, self.p_max, closure, admit, shift, unit)
         written = (free_set.mask, plane, free_set.bin_sums, free_set.bin_counts)
         changes = self.pass_sums(_kernels.select_free_set, bin_columns, *state, *written)[0]  # (3)
@@ -457,41 +444,33 @@ class ConstrainedCG:
         """Take the step (9, 10): as it is, with the displacement updated, or projected onto the bounds."""
         tau = self.dtype(self.tau)
         clipped, force = self.pass_sums(_kernels.projected_step_sums, self.p, self.t, tau, self.p_max)[:2]
-        self.projected = clipped > 0
-        if self.projected:
+        if clipped > 0:
             self.project_onto_bounds(force)
             return
         rows, size = self.h.shape[0], self.h.size
-        self.work_array = self.operator.displacement(self.work_array)  # r (7)
+        r = self.operator.displacement()  # (7)
         in_bands(subtract_step, rows, size, self.p, self.t, tau)  # p = p - tau t (9)
-        in_bands(subtract_step, rows, size, self.u, self.work_array, tau)  # u = u - tau r (10)
+        in_bands(subtract_step, rows, size, self.u, r, tau)  # u = u - tau r (10)
         self.updates += 1
 
     def project_onto_bounds(self, force: float) -> None:
-        """Take the projected step, whose sum is `force`, and restore the imposed force (9).
-
-        The new pressure is written into `work_array`, which then changes places with p.
-        """
-        imposed = self.control.value
-        if self.force_controlled and self.p_max < np.inf:
-            self.project_onto_capped_simplex(imposed)
+        """Take the projected step, whose sum is `force`, and restore the imposed force (9)."""
+        imposed, p = self.control.value, np.empty_like(self.p)
+        if self.force_controlled and self.p_max < np.inf:  # the free set shares the force that this takes off
+            is_free = self.free_set.mask[: self.h.shape[0], : self.h.shape[1]]
+            values = self.p[is_free] - self.tau * self.t[is_free].astype(np.float64)
+            rest = sum_by_rows(np.where(is_free, 0, self.p))
+            p[...] = self.p
+            p[is_free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
         elif self.force_controlled and not force > 0:
-            self.work_array[...] = uniform_on_lowest(self.u + self.h, imposed, float(self.p_max))
+            p[...] = uniform_on_lowest(self.u + self.h, imposed, float(self.p_max))
         else:
             missed = self.force_controlled and abs(force - imposed) > self.epsilon * imposed
             factor = self.dtype(imposed / force if missed else 1.0)
-            step = (self.p, self.t, self.dtype(self.tau), factor, self.p_max, self.work_array)
+            step = (self.p, self.t, self.dtype(self.tau), factor, self.p_max, p)
             in_bands(subtract_and_clip, self.h.shape[0], self.h.size, *step)
-        self.p, self.work_array = self.work_array, self.p
+        self.last_p, self.p = self.p, p
         self.update_displacement()
-
-    def project_onto_capped_simplex(self, imposed: float) -> None:
-        """Take the projected step under a bound p_max; the free set shares the force that this takes off."""
-        is_free = self.free_set.mask[: self.h.shape[0], : self.h.shape[1]]
-        np.copyto(self.work_array, self.p)
-        values = self.p[is_free] - self.tau * self.t[is_free].astype(np.float64)
-        rest = sum_by_rows(np.where(is_free, 0, self.p))
-        self.work_array[is_free] = project_onto_capped_simplex(values, imposed - rest, float(self.p_max))
 
     def overshot(
         self,
@@ -502,7 +481,7 @@ class ConstrainedCG:
         stalled: int = 10,  # iterations without progress; with 50 150 surfaces with spikes converge as well
     ) -> bool:
         """Return whether the last projected step has raised the objective and can be halved."""
-        if not self.projected or self.halvings >= max_halvings:
+        if self.last_p is None or self.halvings >= max_halvings:
             return False
         # Near a stall, require a strict decrease; otherwise nodes may enter and leave in a cycle at constant
         # objective.
@@ -511,11 +490,12 @@ class ConstrainedCG:
         return evaluation.objective > self.last_objective + slack
 
     def backtrack(self) -> None:
-        """Go back half of the last projected step; `work_array` must still hold the pressure before it."""
+        """Go back half of the last projected step."""
+        assert self.last_p is not None  # only a projected step overshoots
         self.halvings += 1
         self.tau /= 2
         self.G = 0.0
-        self.p, self.work_array = self.work_array, self.p
+        self.p = self.last_p
         tau = self.dtype(self.tau)
         sums = self.pass_sums(_kernels.projected_step_sums, self.p, self.t, tau, self.p_max)
         self.project_onto_bounds(sums[1])

@@ -75,12 +75,12 @@ class Operator(ABC):
         self.transforms += 0.5
         return self.filter_and_work(pressure)
 
-    def displacement(self, out: Array | None = None) -> Array:
+    def displacement(self) -> Array:
         """Return the displacement under the pressure of the last call, which was of `work`."""
         if self.is_small:
             return self.latest
         self.transforms += 0.5
-        return self.from_modes(out)
+        return self.from_modes()
 
 
 class PeriodicOperator(Operator):
