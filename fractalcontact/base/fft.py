@@ -119,16 +119,11 @@ def rfft2_padded(plane: Array, padded: tuple[int, int], out: Array | None = None
     return _along(_complex_lines, out, 0, out)
 
 
-def irfft2_cropped(
-    modes: Array, padded: tuple[int, int], shape: tuple[int, int], out: Array | None = None
-) -> Array:
-    """Undo `rfft2_padded` and return the corner (ny, nx) of the plane, in `out` if given.
-
-    The modes are overwritten.
-    """
+def irfft2_cropped(modes: Array, padded: tuple[int, int], shape: tuple[int, int]) -> Array:
+    """Undo `rfft2_padded` and return the corner (ny, nx) of the plane; the modes are overwritten."""
     ny, nx = shape
     _along(_complex_lines, modes, 0, modes, forward=False)
-    out = np.empty((ny, nx), dtype=modes.real.dtype) if out is None else out
+    out = np.empty((ny, nx), dtype=modes.real.dtype)
     in_bands(_undo_rows, _groups(ny), modes.size // 2, modes, padded[1], out)
     return out
 

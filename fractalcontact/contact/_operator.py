@@ -5,7 +5,6 @@ The kernels are imported where they run, because options are validated without t
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from copy import copy
 from functools import lru_cache
 from typing import Any
@@ -46,34 +45,45 @@ class ModesMemory:
         return self.memory.view(complex_type)[:size].reshape(shape[0], -1)
 
 
-class Operator(ABC):
-    """Displacement from pressure; counts its pairs of transforms, half a pair for one way."""
+class Operator:
+    """Displacement from pressure, or the inverse; counts its pairs of transforms, half a pair for one way."""
 
-    def __init__(self, *, is_small: bool) -> None:
-        self.memory = ModesMemory()
+    def __init__(self, plane: tuple[int, int], memory: ModesMemory | None = None, *, is_small: bool) -> None:
+        self.plane, self.memory = plane, memory or ModesMemory()  # of the transforms
         self.is_small = is_small  # the displacement comes with the work, in one call
         self.latest: Array = np.empty(0)  # displacement that came with the work of a small one
+        self.modes: Any = None  # from one transform to its inverse
         self.transforms = 0.0
 
-    @abstractmethod
-    def apply(self, pressure: Array) -> Array:
-        """Return the displacement under `pressure`, both (ny, nx)."""
-
-    def filter_and_work(self, pressure: Array) -> float:
-        """Compute the modes of the displacement by one transform; return the work from them (Parseval)."""
+    def apply_at_once(self, pressure: Array) -> Array:
+        """Return the displacement of a small body, a call for each transform."""
         raise NotImplementedError
 
-    def from_modes(self, out: Array | None = None) -> Array:
+    def filter_modes(self, pressure: Array, work: Array) -> None:
+        """Set the modes of the displacement, and `work` to the sums over their columns."""
+        raise NotImplementedError
+
+    def from_modes(self) -> Array:
         """Return the displacement with the present modes, which are used up."""
         raise NotImplementedError
 
+    def apply(self, pressure: Array) -> Array:
+        """Return the displacement under `pressure`."""
+        self.transforms += 1
+        if self.is_small:
+            return self.apply_at_once(pressure)
+        self.filter_modes(pressure, NO_WORK)
+        return self.from_modes()
+
     def work(self, pressure: Array) -> float:
-        """Return the sum of pressure times displacement."""
+        """Return the sum of pressure times displacement, by one transform (Parseval)."""
         if self.is_small:
             self.latest = self.apply(pressure)
             return float(np.sum(pressure * self.latest, dtype=np.float64))
         self.transforms += 0.5
-        return self.filter_and_work(pressure)
+        columns = np.empty(self.plane[1] // 2 + 1)
+        self.filter_modes(pressure, columns)
+        return sum_of_modes(columns, self.plane)
 
     def displacement(self) -> Array:
         """Return the displacement under the pressure of the last call, which was of `work`."""
@@ -84,83 +94,91 @@ class Operator(ABC):
 
 
 class PeriodicOperator(Operator):
-    """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean."""
+    """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean.
 
-    def __init__(self, shape: tuple[int, int], spacing: tuple[float, float]) -> None:
-        super().__init__(is_small=shape[0] * shape[1] <= SMALL)
-        self.multiplier = WavenumberMultiplier(shape, spacing, self.memory)
+    With a stiffness of the mean it is the inverse, |q|/2. It needs no table of |q|, another array.
+    """
 
-    def apply(self, pressure: Array) -> Array:
-        """Return the displacement under `pressure`, without its mean."""
-        self.transforms += 1
-        return self.multiplier.apply(pressure)
+    def __init__(
+        self,
+        shape: tuple[int, int],
+        spacing: tuple[float, float],
+        memory: ModesMemory | None = None,
+        mean: float = 0.0,
+    ) -> None:
+        super().__init__(shape, memory, is_small=shape[0] * shape[1] <= SMALL)
+        self.spacing = spacing
+        self.law = (0.5, False, mean) if mean else (2.0, True, 0.0)  # factor, whether it is 1/|q|, mean
+        self.transform = fft.PlaneTransform(shape)
 
-    def filter_and_work(self, pressure: Array) -> float:
-        """Compute the modes of the displacement, and the work from them."""
-        return self.multiplier.work(pressure)
+    def apply_at_once(self, pressure: Array) -> Array:
+        """Return the displacement from a table of weights."""
+        modes = self.transform.forward(pressure, self.memory.array(self.plane, pressure.dtype))
+        weights = wavenumber_weights(self.plane, self.spacing, *self.law, pressure.dtype.char)
+        parts = modes.view(pressure.dtype)
+        np.multiply(parts, weights, out=parts)
+        return self.transform.backward(modes)
 
-    def from_modes(self, out: Array | None = None) -> Array:
-        """Return the displacement with the present modes."""
-        return self.multiplier.from_modes(out)
+    def filter_modes(self, pressure: Array, work: Array) -> None:
+        """Set the modes of the displacement, and `work` to the sums over their columns."""
+        from fractalcontact.contact._kernels import scale_modes
+
+        dtype = pressure.dtype.type
+        qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(self.plane, self.spacing))
+        memory = self.memory.array(self.plane, dtype)
+        self.modes = modes = self.transform.forward(pressure, memory)
+        factor, invert, mean = self.law
+        weights = (qy2, qx2, dtype(factor), invert, dtype(mean), work)
+        in_bands(scale_modes, modes.shape[1], modes.size, fft.real_parts(modes), *weights)
+
+    def from_modes(self) -> Array:
+        """Return the displacement with the present modes, which are used up."""
+        modes, self.modes = self.modes, None
+        return self.transform.backward(modes)
 
 
 class HalfSpaceOperator(Operator):
     """Half-space loaded inside a window: convolution on a plane padded so that nothing wraps around."""
 
     def __init__(self, table: Array, dtype: Any = np.float64) -> None:
-        self.shape = (table.shape[0], table.shape[1])
-        self.padded = (padded_length(self.shape[0]), padded_length(self.shape[1]))
-        self.symbol = convolution_symbol(table, self.padded).astype(dtype)
-        self.transform = fft.PlaneTransform(self.padded)
-        super().__init__(is_small=self.padded[0] * self.padded[1] <= 4 * SMALL)  # padded to twice the length
-        self.modes: Any = None  # from one transform to its inverse
-        self.planes: tuple[Array, Array] | None = None  # padded, of a small body
+        ny, nx = self.shape = (table.shape[0], table.shape[1])
+        plane = padded_length(ny), padded_length(nx)
+        super().__init__(plane, is_small=plane[0] * plane[1] <= 4 * SMALL)  # twice the length
+        self.symbol = convolution_symbol(table, plane).astype(dtype)
+        self.transform = fft.PlaneTransform(plane)
+        self.padded: tuple[Array, Array] | None = None  # planes of a small body
 
     def rounded(self, dtype: Any, memory: ModesMemory) -> HalfSpaceOperator:
         """Return the operator in another precision, or in the same one, with this memory."""
         other = copy(self)
         other.symbol, other.memory = self.symbol.astype(dtype, copy=False), memory
-        other.modes, other.planes, other.transforms = None, None, 0.0
+        other.modes, other.padded, other.transforms = None, None, 0.0
         return other
 
-    def apply(self, pressure: Array) -> Array:
-        """Return the displacement under `pressure`."""
-        self.transforms += 1
-        if self.is_small:
-            return self.apply_at_once(pressure)
-        self.filter_modes(pressure, NO_WORK)
-        return self.from_modes()
-
     def apply_at_once(self, pressure: Array) -> Array:
-        """Return the displacement, from transforms of the whole padded plane: a call each."""
+        """Return the displacement from transforms of the whole padded plane."""
         from fractalcontact.contact._kernels import multiply_modes
 
-        if self.planes is None:
-            self.planes = np.zeros(self.padded, pressure.dtype), np.empty(self.padded, pressure.dtype)
-        (ny, nx), (loaded, moved) = self.shape, self.planes
+        if self.padded is None:
+            self.padded = np.zeros(self.plane, pressure.dtype), np.empty(self.plane, pressure.dtype)
+        (ny, nx), (loaded, moved) = self.shape, self.padded
         loaded[:ny, :nx] = pressure
-        modes = self.transform.forward(loaded, self.memory.array(self.padded, pressure.dtype))
+        modes = self.transform.forward(loaded, self.memory.array(self.plane, pressure.dtype))
         in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, NO_WORK)
         return self.transform.backward(modes, moved)[:ny, :nx].copy()
-
-    def filter_and_work(self, pressure: Array) -> float:
-        """Compute the modes of the displacement, and the work from them."""
-        work = np.empty(self.symbol.shape[1])
-        self.filter_modes(pressure, work)
-        return sum_of_modes(work, self.padded)
 
     def filter_modes(self, pressure: Array, work: Array) -> None:
         """Set the modes of the displacement, and `work` to the sums over their columns."""
         from fractalcontact.contact._kernels import multiply_modes
 
-        memory = self.memory.array(self.padded, pressure.dtype)
-        self.modes = modes = fft.rfft2_padded(pressure, self.padded, memory)
+        memory = self.memory.array(self.plane, pressure.dtype)
+        self.modes = modes = fft.rfft2_padded(pressure, self.plane, memory)
         in_bands(multiply_modes, modes.shape[1], modes.size, fft.real_parts(modes), self.symbol, work)
 
-    def from_modes(self, out: Array | None = None) -> Array:
+    def from_modes(self) -> Array:
         """Return the displacement with the present modes, which are used up."""
         modes, self.modes = self.modes, None
-        return fft.irfft2_cropped(modes, self.padded, self.shape, out)
+        return fft.irfft2_cropped(modes, self.plane, self.shape)
 
 
 class PairSum(Operator):
@@ -173,7 +191,7 @@ class PairSum(Operator):
     def __init__(self, table: Array, iy: Array, ix: Array) -> None:
         self.table, self.iy, self.ix = table, iy, ix
         self.all_nodes = np.arange(iy.size)
-        super().__init__(is_small=True)
+        super().__init__((1, iy.size), is_small=True)
 
     def apply(self, pressure: Array) -> Array:
         """Return the sum over all nodes of table[offset] times the pressure, for every node."""
@@ -189,63 +207,6 @@ class PairSum(Operator):
         nodes = (self.iy, self.ix, targets, sources, flat[sources])
         in_bands(pair_sum, targets.size, targets.size * sources.size, self.table, *nodes, out)
         return out.reshape(value.shape)
-
-
-class WavenumberMultiplier:
-    """Multiplies the modes of a plane by 2/|q|, the compliance of a half-space, and takes off its mean.
-
-    With a stiffness of the mean it does the inverse, |q|/2. It needs no table of |q|, another array.
-    """
-
-    def __init__(
-        self, shape: tuple[int, int], spacing: tuple[float, float], memory: ModesMemory, mean: float = 0.0
-    ) -> None:
-        self.shape, self.spacing, self.memory = shape, spacing, memory
-        self.law = (0.5, False, mean) if mean else (2.0, True, 0.0)  # factor, whether it is 1/|q|, mean
-        self.transform = fft.PlaneTransform(shape)
-        self.modes: Any = None  # from one transform to its inverse
-        self.is_small = shape[0] * shape[1] <= SMALL
-
-    def apply(self, plane: Array, out: Array | None = None) -> Array:
-        """Return the plane with its modes multiplied.
-
-        It is written into `out` if given, which may be the plane itself.
-        """
-        if self.is_small:
-            return self.apply_at_once(plane, out)
-        self.filter_modes(plane, NO_WORK)
-        return self.from_modes(out)
-
-    def apply_at_once(self, plane: Array, out: Array | None) -> Array:
-        """Return the plane filtered by a table, a call for each transform."""
-        modes = self.transform.forward(plane, self.memory.array(self.shape, plane.dtype))
-        weights = wavenumber_weights(self.shape, self.spacing, *self.law, plane.dtype.char)
-        parts = modes.view(plane.dtype)
-        np.multiply(parts, weights, out=parts)
-        return self.transform.backward(modes, out)
-
-    def work(self, plane: Array) -> float:
-        """Return the sum of a plane times what `apply` would return, and keep the modes for `plane`."""
-        work = np.empty(self.shape[1] // 2 + 1)
-        self.filter_modes(plane, work)
-        return sum_of_modes(work, self.shape)
-
-    def filter_modes(self, plane: Array, work: Array) -> None:
-        """Set the modes of the filtered plane, and `work` to the sums over their columns."""
-        from fractalcontact.contact._kernels import scale_modes
-
-        dtype = plane.dtype.type
-        qy2, qx2 = (part.astype(dtype) for part in squared_wavenumbers(self.shape, self.spacing))
-        memory = self.memory.array(self.shape, dtype)
-        self.modes = modes = self.transform.forward(plane, memory)
-        factor, invert, mean = self.law
-        weights = (qy2, qx2, dtype(factor), invert, dtype(mean), work)
-        in_bands(scale_modes, modes.shape[1], modes.size, fft.real_parts(modes), *weights)
-
-    def from_modes(self, out: Array | None = None) -> Array:
-        """Return the plane with the present modes, which are used up."""
-        modes, self.modes = self.modes, None
-        return self.transform.backward(modes, out)
 
 
 def squared_wavenumbers(shape: tuple[int, int], spacing: tuple[float, float]) -> tuple[Array, Array]:

@@ -31,7 +31,7 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.resources import in_bands
-from fractalcontact.contact._operator import KEPT, SINGLE, ModesMemory, PairSum, WavenumberMultiplier
+from fractalcontact.contact._operator import KEPT, SINGLE, ModesMemory, PairSum, PeriodicOperator
 from fractalcontact.contact._problem import Body
 
 # The numbers here and of `bin_edge` and `padded_plane` are measured by the transforms of solutions at three
@@ -72,7 +72,7 @@ class ExtensionPreconditioner:
         self.self_compliance = float(np.sqrt(body.spacing[0] * body.spacing[1])) / 2
         extent = np.sqrt(self.plane_shape[0] * body.spacing[0] * self.plane_shape[1] * body.spacing[1])
         # that of a flat block under a rigid flat; a periodic body has no stiffness for its mean
-        self.multiplier = WavenumberMultiplier(self.plane_shape, body.spacing, memory, 1.0 / float(extent))
+        self.inverse = PeriodicOperator(self.plane_shape, body.spacing, memory, 1.0 / float(extent))
         self.dtype = dtype
         self.transforms = 0
 
@@ -101,7 +101,7 @@ class ExtensionPreconditioner:
         size = self.plane_shape[0] * self.plane_shape[1]
         grid = (self.bin_rows, self.bin_columns, free_set.mask)
         in_bands(_kernels.fill_outside, self.bin_shape[0], size, *grid, extension, x)
-        pressure = self.multiplier.apply(x, out=x)
+        pressure = self.inverse.apply(x)
         outside = extension  # the array is not needed any more
         in_bands(_kernels.sum_outside, self.bin_shape[0], size, *grid, pressure, outside)
         outside *= weight
@@ -182,8 +182,8 @@ def stiffness_table(body: Body) -> Array:
     impulse = np.zeros(plane)
     impulse[0, 0] = 1.0
     extent = float(np.sqrt(ny * body.spacing[0] * nx * body.spacing[1]))
-    waves = WavenumberMultiplier(plane, body.spacing, ModesMemory(), 1.0 / extent)
-    return np.ascontiguousarray(waves.apply(impulse)[:ny, :nx])
+    inverse = PeriodicOperator(plane, body.spacing, mean=1.0 / extent)
+    return np.ascontiguousarray(inverse.apply(impulse)[:ny, :nx])
 
 
 def bin_layout(body: Body) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
