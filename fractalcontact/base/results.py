@@ -25,7 +25,7 @@ from __future__ import annotations
 
 import inspect
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
@@ -46,7 +46,7 @@ from fractalcontact.base.resources import (
     plane_in,
     require_memory,
 )
-from fractalcontact.base.schema import STOP_REASONS, Quantity, declare, label
+from fractalcontact.base.schema import STOP_REASONS, label
 from fractalcontact.base.study import NO_REFERENCES
 from fractalcontact.base.validation import Problems, did_you_mean
 
@@ -57,7 +57,6 @@ R_co = TypeVar("R_co", covariant=True)
 ARRAYS = 32.0  # bytes for each cell of a call that declares nothing: four arrays
 WORK = {"transforms": "pairs of transforms", "iterations": "iterations"}
 NO_REASONS: Mapping[str, str] = {}
-NO_QUANTITIES: Mapping[str, Quantity] = {}
 
 
 class PublicFunction(Protocol[P, R_co]):
@@ -93,7 +92,6 @@ def public_result(
     in_blocks: bool = False,
     memory: Estimate = ARRAYS,
     reasons: Mapping[str, str] = NO_REASONS,
-    quantities: Mapping[str, Quantity] = NO_QUANTITIES,
     path_figure: str = "",
 ) -> Callable[[Callable[P, R]], PublicFunction[P, R]]:
     """Return a decorator that validates the call of a public function and labels its result.
@@ -118,14 +116,10 @@ def public_result(
         ``memory(plane, arguments)`` (see `base.resources`). More than may be taken is refused beforehand.
     reasons : mapping
         Why a variable of the result has NaN, by name, where the function does not state it itself.
-    quantities : mapping
-        Unit and meaning of the variables that no other function returns, by name; those of several functions
-        are in `base.schema`.
     path_figure : str
         Variables with a space between them, of one unit, that `plotting.draw` draws along the path of load or
         shear; an attribute of the result.
     """
-    declare(quantities)
 
     def decorate(function: Callable[P, R]) -> PublicFunction[P, R]:
         signature: inspect.Signature = inspect.signature(function)
@@ -133,61 +127,50 @@ def public_result(
         hands_on = hasattr(function, "takes_checked")
         takes_spacing: bool = SURFACE in signature.parameters and SPACING not in signature.parameters
 
-        def checked(arguments: Any, options: dict[str, Any]) -> tuple[inspect.BoundArguments, str, Any]:
+        def checked(arguments: Any, options: dict[str, Any]) -> tuple[inspect.BoundArguments, Any, str]:
+            """Return the arguments of a valid call, what its check has read, what was done to the surface."""
             spacing = options.pop(SPACING, None) if takes_spacing else None
-            try:
-                bound = signature.bind(*arguments, **options)
-            except TypeError as cause:
-                names = [*signature.parameters, *([SPACING] if takes_spacing else [])]
-                listed = f" (its arguments are {', '.join(names)})"
-                hints = [
-                    f"{word!r} is no argument{did_you_mean(word, names) or listed}"
-                    for word in options
-                    if word not in names
-                ]
-                raise TypeError(f"{name}: {'; '.join(hints) or cause}") from None
-            bound.apply_defaults()
-            done = usual_arguments(name, bound.arguments, spacing)
-            bound.arguments.update({key: python_number(value) for key, value in bound.arguments.items()})
-            loaded = loaded_bytes(bound.arguments)
+            bound = _bound(name, signature, arguments, options, [SPACING] if takes_spacing else [])
+            given = bound.arguments
+            done = usual_arguments(name, given, spacing)
+            given.update({key: python_number(value) for key, value in given.items()})
+            loaded = loaded_bytes(given)
             if loaded and not in_blocks:
-                require_memory(name, loaded, _size_of(bound.arguments))
-            with Problems(name, error, bound.arguments) as problems:
-                checked_values = None if check is None else check(problems)
+                require_memory(name, loaded, _size_of(given))
+            with Problems(name, error, given) as problems:
+                read = None if check is None else check(problems)
             # a dask array that is read in blocks does not count
-            plane = None if in_blocks and loaded else plane_in(bound.arguments)
-            needed = bytes_on(memory, plane or Plane((0, 0)), bound.arguments)  # beyond its arguments
-            require_memory(name, needed, _size_of(bound.arguments))
-            return bound, done, checked_values
+            plane = None if in_blocks and loaded else plane_in(given)
+            needed = bytes_on(memory, plane or Plane((0, 0)), given)  # beyond its arguments
+            require_memory(name, needed, _size_of(given))
+            return bound, read, done
+
+        def labelled(result: R, given: dict[str, Any], done: str, seconds: float) -> R:
+            """Return the result with its labels, the reasons of its NaN, and its provenance."""
+            entries: dict[str, Any] = {"title": title, "references": references, "run_time": seconds}
+            entries |= {} if achieved_error is None else {"achieved_error": achieved_error}
+            entries |= result.attrs
+            kept = {"completeness": entries.pop("completeness", None), "path_figure": path_figure or None}
+            result.attrs = {key: value for key, value in kept.items() if value is not None}
+            if isinstance(result, xr.Dataset):
+                result = result if "run_time" in result.variables else _with_run_time(result, seconds)
+            result = label(result)
+            give_reasons(result, reasons)
+            result = stamp(result, name, given | entries.pop("parameters", {}), **entries)
+            if done:
+                result.attrs["history"] += f" (surface: {done})"
+            return with_load_indexes(result)
 
         @wraps(function)
         def call(*arguments: P.args, **options: P.kwargs) -> R:
             start = time.perf_counter()
             with _named_errors(name):
-                bound, done, checked_values = checked(arguments, options)
+                bound, read, done = checked(arguments, options)
                 if not in_blocks:
                     announce_loading(name, bound.arguments)
-                first = (checked_values,) if hands_on else ()
-                result = function(*first, *bound.args, **bound.kwargs)
+                result = function(*((read,) if hands_on else ()), *bound.args, **bound.kwargs)
             _warn_unconverged(name, result)
-            completeness = result.attrs.pop("completeness", None)
-            entries: dict[str, Any] = {"title": title, "references": references} | result.attrs
-            result.attrs = {} if completeness is None else {"completeness": completeness}
-            if path_figure:
-                result.attrs["path_figure"] = path_figure
-            parameters = bound.arguments | entries.pop("parameters", {})
-            if achieved_error is not None:
-                entries.setdefault("achieved_error", achieved_error)
-            elapsed = time.perf_counter() - start
-            if isinstance(result, xr.Dataset):
-                result = result if "run_time" in result.variables else _with_run_time(result, elapsed)
-            entries.setdefault("run_time", elapsed)
-            result = label(result)
-            give_reasons(result, reasons)
-            result = stamp(result, name, parameters, **entries)
-            if done:
-                result.attrs["history"] += f" (surface: {done})"
-            return with_load_indexes(result)
+            return labelled(result, bound.arguments, done, time.perf_counter() - start)
 
         def validate(*arguments: P.args, **options: P.kwargs) -> None:
             with _named_errors(name):
@@ -199,6 +182,25 @@ def public_result(
         return public
 
     return decorate
+
+
+def _bound(
+    name: str, signature: inspect.Signature, arguments: Any, options: dict[str, Any], further: Sequence[str]
+) -> inspect.BoundArguments:
+    """Return the arguments of a call with all defaults; of a wrong word the error names the nearest argument.
+
+    `further` are arguments that the function does not have itself.
+    """
+    try:
+        bound = signature.bind(*arguments, **options)
+    except TypeError as cause:
+        names = [*signature.parameters, *further]
+        listed = f" (its arguments are {', '.join(names)})"
+        wrong = [word for word in options if word not in names]
+        hints = [f"{word!r} is no argument{did_you_mean(word, names) or listed}" for word in wrong]
+        raise TypeError(f"{name}: {'; '.join(hints) or cause}") from None
+    bound.apply_defaults()
+    return bound
 
 
 def _with_run_time(result: xr.Dataset, seconds: float) -> xr.Dataset:

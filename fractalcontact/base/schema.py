@@ -373,6 +373,11 @@ QUANTITIES: dict[str, Quantity] = {
     "wet_fraction": Quantity("1", "area under water pressure over nominal area"),
     "isolated_fraction": Quantity("1", "open area that no water reaches over nominal area"),
     # domains
+    "exponent": Quantity("1", "exponent s of the content"),
+    "hausdorff_content": Quantity(None, "Hausdorff content by dyadic squares, mean over the shifts"),
+    "hausdorff_content_min": Quantity(None, "Hausdorff content, least over the shifts"),
+    "relative_content": Quantity("1", "Hausdorff content over that power of the side of the extent"),
+    "coarsest_side": Quantity("m", "side of the largest square of the cover"),
     "stationary_exponent": Quantity("1", "exponent at which the content does not depend on the resolution"),
     "scale": Quantity("m", "side of the square"),
     "side": Quantity("m", "side of the square"),
@@ -529,19 +534,6 @@ QUANTITIES: dict[str, Quantity] = {
 T = TypeVar("T", xr.Dataset, xr.DataArray)
 
 
-def declare(quantities: Mapping[str, Quantity]) -> None:
-    """Add the names that one function alone uses, which stand beside it, to the table.
-
-    Raises
-    ------
-    ValueError
-        The table has a name already: it has one meaning in all results.
-    """
-    if taken := sorted(quantities.keys() & QUANTITIES.keys()):
-        raise ValueError(f"expected names that the schema does not have, got {', '.join(taken)}")
-    QUANTITIES.update(quantities)
-
-
 NOTES = ("long_name", "comment", "reason")
 
 
@@ -613,8 +605,7 @@ def encoded(dataset: xr.Dataset) -> xr.Dataset:
 def _label_variable(name: str, variable: xr.Variable, kept: tuple[str, ...], *, is_coordinate: bool) -> None:
     """Label a variable; of its attributes some are kept, and units that it may state."""
     if name not in QUANTITIES:
-        where = "`public_result(quantities=...)` of its function, or `base/schema.py`"
-        raise KeyError(f"variable {name!r} has no unit: give it a Quantity in {where}")
+        raise KeyError(f"variable {name!r} has no unit: give it a Quantity in `base/schema.py`")
     quantity, stated = QUANTITIES[name], variable.attrs
     attributes = quantity.labels.copy()
     if name in CORE_DIMS and "period" in stated:

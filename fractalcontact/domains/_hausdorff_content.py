@@ -18,7 +18,6 @@ from fractalcontact.base.grid import DECADES, EXCESS_PER_EDGE, UNIFORM, contact_
 from fractalcontact.base.numbers import ROUNDED, float_array
 from fractalcontact.base.regression import local_slope
 from fractalcontact.base.results import public_result
-from fractalcontact.base.schema import Quantity
 from fractalcontact.base.validation import NONE, Problems
 from fractalcontact.domains import _masks
 from fractalcontact.domains._aligned_boxes import coarsened
@@ -52,13 +51,6 @@ def _check(problems: Problems) -> None:
     references=SOURCE,
     achieved_error="exact",
     check=_check,
-    quantities={
-        "exponent": Quantity("1", "exponent s of the content"),
-        "hausdorff_content": Quantity(None, "Hausdorff content by dyadic squares, mean over the shifts"),
-        "hausdorff_content_min": Quantity(None, "Hausdorff content, least over the shifts"),
-        "relative_content": Quantity("1", "Hausdorff content over that power of the side of the extent"),
-        "coarsest_side": Quantity("m", "side of the largest square of the cover"),
-    },
 )
 def hausdorff_content(
     mask: xr.DataArray,

@@ -24,9 +24,3 @@ def test_every_unit_is_valid_udunits():
             Unit(quantity.units)
         assert quantity.long_name, name
     assert "load" not in schema.QUANTITIES
-
-
-def test_a_name_has_one_meaning():
-    with pytest.raises(ValueError, match="expected names that the schema does not have, got closure"):
-        schema.declare({"closure": schema.Quantity("s", "time until closing")})
-    assert schema.QUANTITIES["closure"].units == "m"
