@@ -188,6 +188,13 @@ def test_las_and_laz(tmp_path, suffix):
     np.testing.assert_allclose(surface.x, X[0] + 5e5, atol=1e-6)
 
 
+@pytest.mark.parametrize("columns", [(1, 1, 2), ("x", 0, "z")])
+def test_one_column_for_two_coordinates_is_refused(tmp_path, columns):
+    (tmp_path / "a.csv").write_text(text_lines(",", "x,y,z\n"))
+    with pytest.raises(UnreadableFile, match="columns: expected another column for each coordinate"):
+        fc.surfaces.read(tmp_path / "a.csv", columns=columns)
+
+
 def test_longitudes_and_latitudes_are_refused(tmp_path):
     (tmp_path / "a.csv").write_text(text_lines(",", "lon,lat,z\n"))
     with pytest.raises(UnreadableFile, match="project"):
