@@ -14,7 +14,7 @@ import xarray as xr
 
 from fractalcontact.base import netcdf
 from fractalcontact.base.errors import MissingExtra, ScaleWarning, UnreadableFile, warn
-from fractalcontact.base.grid import METRES, UNIFORM, core_dims, plane_coords, read_grid
+from fractalcontact.base.grid import METRES, UNIFORM, axis_faults, core_dims, plane_coords, read_grid
 from fractalcontact.base.labelled import usual_form
 from fractalcontact.base.numbers import Array, is_real
 from fractalcontact.base.provenance import file_checksum
@@ -95,7 +95,8 @@ def read(
         file; metres for tables, points, rasters and arrays without one. A unit other than that of the file
         replaces it, with a warning.
     spacing : float, or (y, x), optional
-        Distance between points in metres; replaces that of the file. Of points: that of the cells.
+        Distance between points in metres; replaces that of the file, whose periodic axes stay so. Of points:
+        that of the cells.
     first_row : {"bottom", "top"}, optional
         Whether the first row of the file has the smallest y, or is the top of the map, which is flipped.
         Default: "top" for an instrument's file (its reader orders the rows as an image), "bottom" for `.npy`
@@ -355,7 +356,10 @@ def _netcdf_content(request: Request) -> xr.DataArray:
         if spacing is not None and check_spacing(problems, len(core_dims(array)), spacing):
             core = core_dims(array)
             steps, sizes = axis_spacing(spacing, len(core)), [array.sizes[dim] for dim in core]
-            array = array.assign_coords(plane_coords(sizes, steps, [False] * len(core), core))
+            is_periodic = [
+                not any(axis_faults(array, dim, dim)) and read_grid(array, (dim,)).periodic[0] for dim in core
+            ]
+            array = array.assign_coords(plane_coords(sizes, steps, is_periodic, core))
         problems.surface(name, array, finite=False, smallest=2, leading=True, profile=True)
     stated = stated if stated is None else str(stated)
     others = [coord for coord in array.coords if coord not in QUANTITIES]

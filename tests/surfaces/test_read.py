@@ -250,6 +250,15 @@ def test_netcdf_without_units_or_grid_is_refused(tmp_path):
     np.testing.assert_array_equal(surface.values, HEIGHTS)
 
 
+def test_spacing_of_a_netcdf_file_leaves_its_periodic_axes(tmp_path):
+    fc.save(fc.surfaces.from_array(HEIGHTS, 1e-5, periodic=True), tmp_path / "a.nc")
+    surface = fc.surfaces.read(tmp_path / "a.nc", spacing=(2e-5, 3e-5))
+    assert surface.y.attrs["period"] == pytest.approx(6e-5)
+    assert surface.x.attrs["period"] == pytest.approx(12e-5)
+    fc.save(fc.surfaces.from_array(HEIGHTS, 1e-5), tmp_path / "free.nc")
+    assert "period" not in fc.surfaces.read(tmp_path / "free.nc", spacing=2e-5).x.attrs
+
+
 @pytest.mark.parametrize("name", ["a.npy", "a.nc", "a.sur", "a.csv", "a.di.gz"])
 def test_damaged_files_are_refused(tmp_path, name):
     pytest.importorskip("SurfaceTopography")
