@@ -35,6 +35,16 @@ def _beside_random(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
         )
 
 
+def _box_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield in how many states the window is saturated too, so that their dimension says little."""
+    yield from _beside_random(tree, data)
+    if "is_saturated" in data and (count := int(data["is_saturated"].sum())):
+        yield (
+            f"More than half of the largest boxes meet the contacts in {count} of "
+            f"{data['is_saturated'].size} states: there D tells little but the coverage."
+        )
+
+
 def _beside_null(name: str, null: str) -> Any:
     """Return a function that writes a variable and, in brackets, that of random cells of equal coverage.
 
@@ -120,14 +130,16 @@ def _domain(
     )
 
 
-def _set_dimension(name: str, words: str, null: str = " (random)", **more: Any) -> StageType:
+def _set_dimension(
+    name: str, words: str, null: str = " (random)", remarks: Any = _beside_random, **more: Any
+) -> StageType:
     return _domain(
         name,
         words,
         Column(f"{words} D{null}", _beside_null(name, "null_dimension")),
         Column("over", _window),
         Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
-        remarks=_beside_random,
+        remarks=remarks,
         **more,
     )
 
@@ -146,7 +158,7 @@ STAGES = (
         remarks=_signature_window,
         whole_path=True,
     ),
-    _set_dimension("box_dimension", "box", whole_path=True),
+    _set_dimension("box_dimension", "box", remarks=_box_remarks, whole_path=True),
     _domain("box_counts"),
     _set_dimension("minkowski_dimension", "Minkowski"),
     _set_dimension("correlation_dimension", "correlation"),

@@ -470,6 +470,19 @@ def test_analysis_of_the_contact_set_is_on_the_screen(tmp_path):
     assert rows(tree, "islands")[-1]["islands"] == str(count)
 
 
+def test_states_whose_boxes_are_saturated_are_counted():
+    mask = np.zeros((2, 64, 64), bool)
+    mask[0, ::16, ::16] = True
+    mask[1] = np.random.default_rng(1).random((64, 64)) < 0.3
+    boxes = fc.domains.box_dimension(xr.DataArray(mask, dims=("step", "y", "x")))
+    assert "half of the largest boxes meet the contacts in 1 of 2 states" in remarks(
+        xr.DataTree.from_dict({"domains/box_dimension": boxes})
+    )
+    assert "largest boxes" not in remarks(
+        xr.DataTree.from_dict({"domains/box_dimension": boxes.isel(step=[0])})
+    )
+
+
 @pytest.mark.parametrize("along", ["step", "shear"])
 @pytest.mark.parametrize("in_metres", [False, True])
 def test_sets_without_loads_have_rows_and_windows_in_their_own_unit(along, in_metres):
