@@ -104,18 +104,17 @@ def _of_azimuths(surface: Surface, first: FirstFit, window: Scales, known: Known
 def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -> Estimate:
     """Return the estimate from cosine modes, or from the Fourier modes of a periodic surface."""
     fit = first.modes
-    # modes of a surface with gaps tell less than as many of a complete one
-    if fit is None or np.sum(fit.information * fit.keep) < LEAST:
+    if fit is None:
         return undefined(NO_MODES)
     keep = fit.keep & between(2.0 * np.pi / fit.lattice.q, window)
     number, least = int(np.count_nonzero(keep)), LEAST * LEAST_BINS
     if number < least:
         if window is None and keep.size > 4 * least:
             return smooth()
-        which = (
-            "that the edges of the surface do not dominate" if window is None else "in the window of scales"
-        )
+        which = "in the window of scales" if window else "that the edges of the surface do not dominate"
         return undefined(f"{number} modes {which}, at least {least} are needed")
+    if np.sum(fit.information * keep) < LEAST:  # with gaps they tell less than as many without
+        return undefined(NO_MODES)
     bins = replace(fit.bins(keep), noise=known.total_noise)
     found = posterior(bins, known, pilot_spread=float(fit.theta[SPREAD]))
     return _estimate(surface, first, bins, found, known)
