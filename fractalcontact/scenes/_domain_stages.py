@@ -25,23 +25,18 @@ def _window(state: xr.Dataset) -> str | None:
     return text.replace(" ", "\N{NO-BREAK SPACE}")
 
 
-def _beside_random(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield how many sets have box counts that random sets of equal coverage do not have."""
+def _on_sets(_: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
+    """Yield how many sets differ from random ones of equal coverage, and in how many boxes are saturated."""
     if "differs_from_random" in data:
         differs = np.asarray(data["differs_from_random"].values, dtype=bool)
         yield (
             "The counts of boxes of 2, 3 and 4 cells, not the dimensions, are tested against random sets of "
             f"equal coverage: {int(differs.sum())} of {differs.size} sets differ."
         )
-
-
-def _box_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
-    """Yield in how many states the window is saturated too, so that their dimension says little."""
-    yield from _beside_random(tree, data)
     if "is_saturated" in data and (count := int(data["is_saturated"].sum())):
         yield (
             f"More than half of the largest boxes meet the contacts in {count} of "
-            f"{data['is_saturated'].size} states: there D tells little but the coverage."
+            f"{data['is_saturated'].size} states: there D tells little more than the coverage."
         )
 
 
@@ -130,16 +125,14 @@ def _domain(
     )
 
 
-def _set_dimension(
-    name: str, words: str, null: str = " (random)", remarks: Any = _beside_random, **more: Any
-) -> StageType:
+def _set_dimension(name: str, words: str, null: str = " (random)", **more: Any) -> StageType:
     return _domain(
         name,
         words,
         Column(f"{words} D{null}", _beside_null(name, "null_dimension")),
         Column("over", _window),
         Column("95 % interval", ("ci_low", "ci_high"), 2, screen=False),
-        remarks=remarks,
+        remarks=_on_sets,
         **more,
     )
 
@@ -158,7 +151,7 @@ STAGES = (
         remarks=_signature_window,
         whole_path=True,
     ),
-    _set_dimension("box_dimension", "box", remarks=_box_remarks, whole_path=True),
+    _set_dimension("box_dimension", "box", whole_path=True),
     _domain("box_counts"),
     _set_dimension("minkowski_dimension", "Minkowski"),
     _set_dimension("correlation_dimension", "correlation"),
