@@ -113,7 +113,7 @@ def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -
             return smooth()
         which = "in the window of scales" if window else "that the edges of the surface do not dominate"
         return undefined(f"{number} modes {which}, at least {least} are needed")
-    if np.sum(fit.information * keep) < LEAST:  # with gaps they tell less than as many without
+    if np.sum(fit.information * keep) < LEAST:  # a mode of a surface with gaps tells less
         return undefined(NO_MODES)
     bins = replace(fit.bins(keep), noise=known.total_noise)
     found = posterior(bins, known, pilot_spread=float(fit.theta[SPREAD]))

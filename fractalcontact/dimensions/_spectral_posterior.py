@@ -523,9 +523,10 @@ class _Fit:
         return np.asarray((self.bins.level - model).reshape(*u.shape[:2], -1))
 
     def linearised(self, u: Array, *, step: float = 1e-4) -> Array:
-        """Return the residual of a point u of each hypothesis, and less its derivatives.
+        """Return the residual and the derivatives of the expected logarithms by u, for a point u of each
+        hypothesis, shape (hypotheses, 7, bins).
 
-        Those by theta are exact, of theta by u differences over a `step`; shape (hypotheses, 7, bins).
+        The derivatives by theta are exact; those of theta by u are differences over a `step`.
         """
         points = self.theta(u[:, None] + step * np.eye(7, 6, -1))
         theta = points[:, 0]
@@ -553,7 +554,7 @@ class _Fit:
         Parameters
         ----------
         start : ndarray
-            For each kind of discrepancy as many points.
+            As many points for each kind of discrepancy, those of a kind beside each other.
         whitening, constants : ndarray, shape (kinds, bins, bins) and (kinds,)
             See `_whitening`.
         evaluations, least_gain : int, float

@@ -192,7 +192,7 @@ def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> l
     if columns is not None:
         wanted = [names.index(c.lower()) if isinstance(c, str) and c.lower() in names else c for c in columns]
         if all(not isinstance(k, str) and k < number for k in wanted):
-            expected = "another column for each coordinate"
+            expected = "a different column for each coordinate"
             _files.require_readable(len(set(wanted)) == len(wanted), "columns", expected, list(columns))
             return [int(k) for k in wanted]
         choices = ", ".join(map(repr, table.names)) or f"numbers from 0 to {number - 1}"

@@ -191,7 +191,7 @@ def test_las_and_laz(tmp_path, suffix):
 @pytest.mark.parametrize("columns", [(1, 1, 2), ("x", 0, "z")])
 def test_one_column_for_two_coordinates_is_refused(tmp_path, columns):
     (tmp_path / "a.csv").write_text(text_lines(",", "x,y,z\n"))
-    with pytest.raises(UnreadableFile, match="columns: expected another column for each coordinate"):
+    with pytest.raises(UnreadableFile, match="columns: expected a different column for each coordinate"):
         fc.surfaces.read(tmp_path / "a.csv", columns=columns)
 
 
