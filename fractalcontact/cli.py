@@ -301,7 +301,7 @@ def _same_letters(names: Sequence[str]) -> int:
 
 
 def _profile_roughness(heights: Any, folder: Path, name: str, options: argparse.Namespace) -> int:
-    """Print and save dimension, roughness coefficient and statistics of a profile, which need no scene."""
+    """Print and save the dimension and the roughness coefficient of a profile, which need no scene."""
     import xarray as xr
 
     title, target = f"Roughness of the profile {name}", folder / files.RESULT

@@ -81,7 +81,8 @@ def read_points(
         A list of points in text (`.xyz`, `.pts`, `.csv`, `.txt`, `.tsv`, `.dat`, `.asc`), a mesh or cloud
         (`.ply`, `.stl`, `.obj`, `.off`, `.las`, `.laz`; extra `mesh`), or one of them with `.gz`.
     units : str, optional
-        Unit of the coordinates: "m", "mm", "um" ... Default: that of the header, or metres.
+        Unit of the coordinates: "m", "mm", "um" ... Default: those of the header, one for all columns or
+        one for each, or metres.
     columns : sequence of str or int, optional
         Names or numbers (from 0) of the columns of x, y, z, or of x, z of a profile. Default: those called
         so, or the first ones.
@@ -164,25 +165,28 @@ def is_list(table: Table, path: Path, columns: Sequence[str | int] | None) -> bo
 def listed_points(table: Table, path: Path, columns: Sequence[str | int] | None) -> xr.Dataset:
     """Return the points of a table."""
     chosen = _columns(table, path, columns)
-    stated = {table.units[k] for k in chosen if table.units and table.units[k]}
+    values, units = table.values[:, chosen], [table.units[k] for k in chosen] if table.units else []
+    stated = set(filter(None, units))
     with Problems("", UnreadableFile) as problems:
         names = [name for name in table.names if name.lower() in DEGREES]
         expected = f"coordinates in a unit of length; {PROJECT}"
         problems.require(
             not names and not stated & {"deg", "degree", "degrees", "°"}, "columns", expected, names
         )
-        expected = "one unit for all coordinates"
-        problems.require(len(stated) <= 1, "columns", expected, sorted(stated))
-        unknown = [unit for unit in stated if unit not in UNITS]
-        if len(stated) == 1:
-            problems.require(not unknown, "columns", "coordinates in a unit of length", unknown)
-        problems.not_infinite("path", table.values[:, chosen], "coordinates")
+        unknown = sorted(stated.difference(UNITS))
+        problems.require(not unknown, "columns", "coordinates in a unit of length", unknown)
+        expected = "the unit of every coordinate, where they have several"
+        problems.require(len(stated) <= 1 or all(units), "columns", expected, units)
+        problems.not_infinite("path", values, "coordinates")
     entries: dict[str, Any] = {"format": "list of points", "columns": chosen}
     if table.names:
         entries["columns"] = [table.names[k] for k in chosen]
+    if len(stated) > 1:  # all in that of x, as a profilometer writes x in mm and z in um
+        factors = [in_metres(1.0, unit) / in_metres(1.0, units[0]) for unit in units]
+        values, stated, entries["stated_units"] = values * factors, {units[0]}, units
     if table.decimal_comma:
         entries["decimal_mark"] = ","
-    return labelled_points(table.values[:, chosen], next(iter(stated), None), entries)
+    return labelled_points(values, next(iter(stated), None), entries)
 
 
 def _columns(table: Table, path: Path, columns: Sequence[str | int] | None) -> list[int]:

@@ -43,6 +43,7 @@ LISTS = {
     "blank.xyz": text_lines(" "),
     "comma.csv": text_lines(",", "x,y,z\n"),
     "units.csv": text_lines(",", "X [mm],Y [mm],Z [mm]\n", 1e3 * POINTS),
+    "several_units.csv": text_lines(",", "x [mm],y [cm],z [um]\n", POINTS * [1e3, 1e2, 1e6]),
     "words.csv": text_lines(",", "X position [mm],Y position [mm],Z position [mm]\n", 1e3 * POINTS),
     "bare.csv": text_lines(";", "x mm;y mm;z mm\n", 1e3 * POINTS),
     "semicolon.txt": text_lines(";", '"Z";"X";"Y"\n', POINTS[:, [2, 0, 1]]),
@@ -77,6 +78,14 @@ def test_profile_is_an_input(tmp_path):
     assert surface.dims == ("x",)
     np.testing.assert_allclose(surface.values, 0.5 * x**2 / 1e3, rtol=1e-15)
     np.testing.assert_allclose(surface.x, x / 1e3, rtol=1e-15)
+
+
+def test_units_of_columns_are_in_the_provenance(tmp_path):
+    (tmp_path / "trace.csv").write_text(text_lines(",", "x [mm],z [um]\n", POINTS[:, [0, 2]] * [1e3, 1e6]))
+    points = fc.surfaces.read_points(tmp_path / "trace.csv")
+    np.testing.assert_allclose(points.position, POINTS[:, [0, 2]], atol=1e-15)
+    provenance = json.loads(points.attrs["provenance"])
+    assert (provenance["stated_unit"], provenance["stated_units"]) == ("mm", ["mm", "um"])
 
 
 def ply_header(kind, faces):
@@ -239,7 +248,8 @@ def test_tables_of_points_load_no_mesh_library(tmp_path):
     ("name", "content", "problem"),
     [
         ("a.csv", text_lines(",", "left,right,depth\n"), "columns called 'left', 'right', 'depth'"),
-        ("a.csv", text_lines(",", "x [mm],y [mm],z [um]\n"), "one unit"),
+        ("a.csv", text_lines(",", "x [mm],y,z [um]\n"), "unit of every coordinate"),
+        ("a.csv", text_lines(",", "x [mm],y [mm],z [px]\n"), "unit of length"),
         ("a.csv", text_lines(",", "x [px],y [px],z [px]\n"), "unit of length"),
         ("a.csv", text_lines(",", "x,y,z\n", np.full((6, 3), np.inf)), "line 1|infinite"),
         ("a.csv", text_lines(",", "x,y,z\n", [[1.0, 2.0, 3.0]]), "at least 4 points"),
