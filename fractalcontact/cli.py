@@ -27,9 +27,10 @@ from fractalcontact.base.resources import most_workers, require_libraries
 from fractalcontact.base.signals import Stop, Stopped, leaving, noted
 
 FAILED, WRONG_INPUT, STOPPED = 1, 2, 128  # and the number of the signal: as of a shell (POSIX)
+READING = ("spacing", "units", "channel")  # of `surfaces.read`
 TEMPLATE_ARGUMENTS = (  # of `scenes.template`; options of these names give them
-    "spacing", "units", "level", "despike", "young", "poisson", "register", "turn_upper", "friction_angle",
-    "wall_strength",
+    *READING, "level", "despike", "young", "poisson", "register", "turn_upper",
+    "friction_angle", "wall_strength",
 )  # fmt: skip
 ESTIMATOR_OPTIONS = ("hurst", "sizes", "families", "methods", "members", "seed")  # of `accuracy estimators`
 HELP = {  # of options, where it is long
@@ -55,6 +56,8 @@ HELP = {  # of options, where it is long
     "units": "unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of "
     "the file, else m)",
     "spacing": "distance between the points, or of the cells, m, or with its unit: 3e-4, 0.3mm",
+    "channel": "channel of an instrument's file, array of .npz, .mat or .h5, variable of NetCDF, by its name "
+    "or its number from 0",
     "benchmarks": "surfaces, dimensions, contact, domains, joints: error against run time of their methods "
     "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
     "of roughness",
@@ -191,6 +194,10 @@ def _metre(text: str) -> float:
     return _or_refused(metres(text), "a length in metres, or with its unit (0.3 mm)", text)
 
 
+def _channel(text: str) -> str | int:
+    return int(text) if text.isdecimal() else text
+
+
 def _or_refused(value: float | None, expected: str, text: str) -> float:
     """Return the value of an option; refuse the option where it has none."""
     if value is None:
@@ -216,6 +223,7 @@ def _add_question_options(command: argparse.ArgumentParser, question: str) -> No
     add("--despike", action="store_true", help="remove spikes of the scan")
     add("--units", help=HELP["units"])
     add("--spacing", type=_metre, help=HELP["spacing"])
+    add("--channel", type=_channel, help=HELP["channel"])
     add("-o", "--out", help=HELP["question folder"])
     add("--scene", action="store_true", help="print the scene and run nothing")
 
@@ -240,7 +248,7 @@ def _answer(options: argparse.Namespace) -> int:
             errors.warn(f"{option}: {value:g} Pa is {what}; is it {value:g} {unit}?", errors.ScaleWarning)
     place = "." if options.scene else folder
     if options.question == "roughness" and not options.scene and not several:
-        reading = {name: arguments[name] for name in ("spacing", "units") if arguments[name] is not None}
+        reading = {name: arguments[name] for name in READING if arguments[name] is not None}
         heights = fc.surfaces.read(scan, **reading)
         if heights.dims == ("x",):
             return _profile_roughness(heights, Path(folder), Path(scan).name, options)

@@ -403,6 +403,19 @@ def test_spacing_may_have_its_unit(scans, capsys):
     assert "expected a length in metres, or with its unit (0.3 mm), got '2 Pa'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("channel", ["fine", "1"])
+def test_channel_is_chosen_by_name_or_number(scans, capsys, channel):
+    heights = fc.open("lower.nc").values
+    np.savez("two.npz", coarse=10 * heights, fine=heights)
+    words = ["roughness", "two.npz", "--spacing", "0.2mm", "--quiet"]
+    assert main(words) == 2
+    assert "channel: expected one of 'coarse', 'fine'" in capsys.readouterr().err
+    assert main([*words, "--channel", channel]) == 0
+    stored = fc.open("two_roughness/result.nc")["surfaces"].to_dataset()
+    levelled = fc.surfaces.level(fc.surfaces.read("two.npz", spacing=2e-4, channel="fine"))
+    np.testing.assert_array_equal(stored["height"].values, levelled.values)
+
+
 def test_option_of_another_command_shows_the_usage_of_the_command(scans, capsys):
     with pytest.raises(SystemExit) as left:
         main(["joint", "lower.nc", "upper.nc", "--young", "30GPa", "--load", "2MPa"])
