@@ -430,7 +430,7 @@ def fit_azimuths(
         classes = Classes(modes, power, spectrum, band)
         if classes.places.size < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
             return None
-        if not first.is_complete:
+        if first.filling is not None:
             classes.corrected(*_filled_levels(classes, observed))
         return classes
 
@@ -454,7 +454,7 @@ def fit_azimuths(
         found = replace(found, share=share / share.sum())
         return bins, found, *max(fits, key=lambda fit: float(found.share[fit[3]].sum()))[:2]
 
-    start = None if first.is_complete else first.modes
+    start = None if first.filling is None else first.modes
     theta, form = (first.theta, first.form) if start is None else (start.theta, start.form)
     spectrum = MetricSpectrum(theta, form, first.log_ratio, dy)
     nearest = math.inf
@@ -477,7 +477,7 @@ def fit_azimuths(
     classes, bins, found, spectrum, covariance = result
     isotropic, uv = replace(spectrum, log_ratio=np.zeros(2)), spectrum.log_ratio
     p_values = classes.test(isotropic, is_fitted=False), classes.test(spectrum, is_fitted=True)
-    if not first.is_complete and not found.most_probable[1].inside.all():
+    if first.filling is not None and not found.most_probable[1].inside.all():
         # beyond a cut the waves are those of the filling, which know the axes
         p_values = math.nan, math.nan
     if p_values[1] < IMPROBABLE:  # each azimuth is compared with all of them

@@ -181,7 +181,7 @@ def _missing_extremes(heights: Array, edge: int = 15) -> str:
     `edge`: points along an edge of the surroundings. Of `LEAST` gaps the scatter of their means is known to a
     quarter.
     """
-    from scipy.ndimage import grey_dilation, label, mean, uniform_filter
+    from scipy.ndimage import grey_dilation, label, uniform_filter
 
     observed = np.isfinite(heights)
     if observed.all() or heights.shape[0] == 1:
@@ -191,14 +191,15 @@ def _missing_extremes(heights: Array, edge: int = 15) -> str:
     for border in (gaps[0], gaps[-1], gaps[:, 0], gaps[:, -1]):
         is_inner[border] = False
     owner = np.where(observed, grey_dilation(np.where(is_inner[gaps], gaps, 0), (3, 3)), 0)
-    numbers = np.unique(owner)[1:]
-    if numbers.size < LEAST:
+    count = np.bincount(owner.ravel())
+    beside = count[1:] > 0
+    if np.count_nonzero(beside) < LEAST:
         return ""
     around = uniform_filter(np.where(observed, heights, 0.0), edge)
     around /= np.maximum(uniform_filter(observed.astype(float), edge), 1e-6)
     deviation = np.where(observed, heights - around, 0.0)
-    means = np.asarray(mean(deviation, owner, numbers))
-    z = float(means.mean() / (means.std(ddof=1) / np.sqrt(numbers.size)))
+    means = np.bincount(owner.ravel(), deviation.ravel())[1:][beside] / count[1:][beside]
+    z = float(means.mean() / (means.std(ddof=1) / np.sqrt(means.size)))
     if not abs(z) > _DEVIATIONS:
         return ""
     which = "low" if z < 0 else "high"

@@ -312,12 +312,6 @@ def rms_increment(heights: Array) -> float:
     return 1.0
 
 
-def fill(heights: Array) -> Array:
-    """Return heights without gaps, see `Filling`; complete ones as they are."""
-    observed = np.isfinite(heights)
-    return heights if observed.all() else Filling(observed)(heights)
-
-
 class Filling:
     """Fill gaps with the mean of their surroundings, of the pyramid of 2 x 2 means.
 
@@ -368,9 +362,9 @@ def _halved(values: Array) -> Array:
     return sums
 
 
-def filling_ratio(lattice: Lattice, pilot: Array, observed: Array) -> Array:
+def filling_ratio(lattice: Lattice, pilot: Array, filling: Filling) -> Array:
     """Return the power of modes after filling over that before, for Gaussian modes of the pilot."""
-    before, after, filling = np.zeros_like(pilot), np.zeros_like(pilot), Filling(observed)
+    before, after = np.zeros_like(pilot), np.zeros_like(pilot)
     for modes, heights in gaussian_surfaces(lattice, pilot):
         before += modes**2
         after += lattice.power(filling(heights))

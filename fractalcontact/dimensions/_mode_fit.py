@@ -25,10 +25,10 @@ from fractalcontact.dimensions._mode_bins import (
     LEAST_BINS,
     SETTLED,
     TAPERED,
+    Filling,
     Levels,
     clear_modes,
     expected_power,
-    fill,
     filling_ratio,
     lay,
     levels_by_azimuth,
@@ -63,6 +63,8 @@ class FirstFit:
     ----------
     heights, filled : ndarray
         Without a plane and an unobserved rim, in rms increments over one x spacing; without gaps.
+    filling : Filling, optional
+        What filled the gaps, if there are any.
     scale : float
         Rms increment of the scaled heights of the surface.
     lattice : Lattice
@@ -81,6 +83,7 @@ class FirstFit:
 
     heights: Array
     filled: Array
+    filling: Filling | None
     scale: float
     lattice: Lattice
     spread: float | None
@@ -99,7 +102,7 @@ class FirstFit:
         lattice, theta, form = self.lattice, self.theta, self.form
         if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
             return None
-        observed, is_complete = np.isfinite(self.heights), self.is_complete
+        filling, is_complete = self.filling, self.filling is None
         modes = lattice.power(self.filled)
         correction: Array | float = 1.0
         information: Array | float = 1.0
@@ -109,9 +112,9 @@ class FirstFit:
             sharp = np.where(np.arange(theta.size) == SPREAD, 0.0, theta)
             unblurred = expected_power(lattice, sharp, form, edges=False) if theta[SPREAD] > 0.0 else clean
             keep = clear_modes(pilot, clean, unblurred)
-            if not is_complete and not is_settled:
-                correction = filling_ratio(lattice, pilot, observed)
-                information = float(np.mean(observed)) ** 2 * np.minimum(1.0, correction)
+            if filling is not None and not is_settled:
+                correction = filling_ratio(lattice, pilot, filling)
+                information = float(np.mean(filling.observed)) ** 2 * np.minimum(1.0, correction)
             power = modes if is_complete else modes / correction
             keep &= power > EMPTY * pilot
             if not keep.any():
@@ -138,11 +141,6 @@ class FirstFit:
             is_settled = left == 2 or bool(np.abs(change[keep]).max() < SETTLED)
         information = information / unevenness(self.heights)
         return ModeFit(lattice, power / level, pilot, keep, information, theta, form)
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether no height is missing."""
-        return self.heights is self.filled
 
 
 @dataclass(frozen=True)
@@ -183,19 +181,19 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
 
     heights = _without_rim(surface.heights)
     observed = np.isfinite(heights)
-    is_complete = bool(observed.all())
+    filling = None if observed.all() else Filling(observed)
     shape = heights.shape[0], heights.shape[1]
     if min(shape[-surface.axes :]) < 4:
         return None
-    lattice = Lattice(shape, surface.plane_spacing, all(surface.grid.periodic) and is_complete)
+    lattice = Lattice(shape, surface.plane_spacing, all(surface.grid.periodic) and filling is None)
     if lattice.periodic:
         heights = heights - heights[observed].mean()
     else:
         heights = detrended(heights, 1)[0]
     scale = rms_increment(heights)
     heights /= scale
-    filled = fill(heights)
-    torus, power = _tapered(filled, lattice, is_complete)
+    filled = heights if filling is None else filling(heights)
+    torus, power = _tapered(filled, lattice, observed)
     information = 1.0 if torus is lattice else TAPERED
     pilot = torus.q ** (-1.0 - torus.axes)
     inside = power > EMPTY * float(np.max(power / pilot)) * pilot
@@ -216,20 +214,23 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     is_off_axes = bool(uv[1] ** 2 > float(chdtri(1, FALSE_ALARM)) * variance[1, 1])
     is_oblique = is_off_axes and not lattice.periodic and of_slope * math.hypot(*uv) > NEAR_ISOTROPY
     lattice = replace(lattice, stretch=torus.stretch)
-    return FirstFit(heights, filled, scale, lattice, spread, theta, hypothesis.form, shrunk, is_oblique)
+    return FirstFit(
+        heights, filled, filling, scale, lattice, spread, theta, hypothesis.form, shrunk, is_oblique
+    )
 
 
-def _tapered(heights: Array, lattice: Lattice, is_complete: bool) -> tuple[Lattice, Array]:
+def _tapered(heights: Array, lattice: Lattice, observed: Array) -> tuple[Lattice, Array]:
     """Return the lattice of the Fourier modes of the tapered surface, or of its middle, and their power.
 
-    A whole periodic surface needs no taper.
+    The middle of a large surface serves if most of it was observed. A whole periodic surface needs no taper.
     """
     edge = LARGEST_CROP ** (3 - lattice.axes)
-    is_part = is_complete and max(heights.shape) > edge
+    middle = middle_slices(heights.shape, edge)
+    is_part = max(heights.shape) > edge and bool(observed[middle].mean() > 0.5)
     if lattice.periodic and not is_part:
         return lattice, lattice.power(heights)
     if is_part:
-        heights = heights[middle_slices(heights.shape, edge)]
+        heights = heights[middle]
     if lattice.axes == 2:  # offsets of rows and columns are in none of the modes
         heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
     tapers = [window_weights(n, None if n == 1 else "hann") for n in heights.shape]
