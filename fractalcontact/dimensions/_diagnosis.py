@@ -186,11 +186,9 @@ def _missing_extremes(heights: Array, edge: int = 15) -> str:
     observed = np.isfinite(heights)
     if observed.all() or heights.shape[0] == 1:
         return ""
-    gaps, number = label(~observed, np.ones((3, 3)))
-    is_inner = np.ones(number + 1, dtype=bool)
-    for border in (gaps[0], gaps[-1], gaps[:, 0], gaps[:, -1]):
-        is_inner[border] = False
-    owner = np.where(observed, grey_dilation(np.where(is_inner[gaps], gaps, 0), (3, 3)), 0)
+    gaps, _ = label(~observed, np.ones((3, 3)))
+    border = np.concatenate([gaps[0], gaps[-1], gaps[:, 0], gaps[:, -1]])
+    owner = np.where(observed, grey_dilation(np.where(np.isin(gaps, border), 0, gaps), (3, 3)), 0)
     count = np.bincount(owner.ravel())
     beside = count[1:] > 0
     if np.count_nonzero(beside) < LEAST:

@@ -12,6 +12,7 @@ that of the surface. One treatment serves points, blocks, rims and lines of gaps
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -315,8 +316,9 @@ def rms_increment(heights: Array) -> float:
 class Filling:
     """Fill gaps with the mean of their surroundings, of the pyramid of 2 x 2 means.
 
-    Some sweeps then move each missing point to the mean of its four neighbours; after twelve the fill of
-    single points is harmonic to 1 %. Those of a profile are filled by straight lines.
+    From coarse to fine a missing mean is interpolated from the next coarser ones, then moved to the mean of
+    its four neighbours some times: the fill is nearly harmonic and has no steps of its own, whose power would
+    be that of short waves. Gaps of a profile are filled by straight lines.
 
     Parameters
     ----------
@@ -328,28 +330,34 @@ class Filling:
         while weights[-1].size > 1 and not weights[-1].all():
             weights.append(_halved(weights[-1]))
         self.levels = [(np.maximum(weight, 1.0), *np.nonzero(weight == 0.0)) for weight in weights]
-        (_, y, x), steps = self.levels[0], ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
-        places = [np.ravel_multi_index((y + i, x + j), observed.shape, mode="clip") for i, j in steps]
-        self.missing, *self.near = places
 
-    def __call__(self, heights: Array, sweeps: int = 12) -> Array:
+    def __call__(self, heights: Array) -> Array:
         """Return heights without gaps."""
         if len(heights) == 1:
             places, seen = np.arange(heights.size), self.observed[0]
             return np.asarray(np.interp(places, places[seen], heights[0, seen])[None])
-        filled = self._means(np.where(self.observed, heights, 0.0))
-        flat = filled.ravel()
-        for _ in range(sweeps):
-            flat[self.missing] = 0.25 * sum(flat[near] for near in self.near)
-        return filled
+        return self._means(np.where(self.observed, heights, 0.0))
 
-    def _means(self, sums: Array, level: int = 0) -> Array:
-        """Return sums over weights where there are any, the same of sums of 2 x 2 points elsewhere."""
-        weight, rows, columns = self.levels[level]
+    def _means(self, sums: Array, level: int = 0, sweeps: int = 4) -> Array:
+        """Return sums over weights; where there are none, what the sums of 2 x 2 points fill in."""
+        weight, y, x = self.levels[level]
         mean = np.asarray(sums / weight)
-        if level + 1 < len(self.levels):
-            mean[rows, columns] = self._means(_halved(sums), level + 1)[rows // 2, columns // 2]
+        if y.size == 0 or level + 1 == len(self.levels):
+            return mean
+        coarse = self._means(_halved(sums), level + 1)
+        sides = [((0.75, n // 2), (0.25, n // 2 + n % 2 * 2 - 1)) for n in (y, x)]
+        pairs = itertools.product(*sides)
+        mean[y, x] = sum(u * v * coarse.take(_places(coarse, i, j)) for (u, i), (v, j) in pairs)
+        near = [_places(mean, y + i, x + j) for i, j in ((-1, 0), (1, 0), (0, -1), (0, 1))]
+        flat, missing = mean.ravel(), _places(mean, y, x)
+        for _ in range(sweeps):
+            flat[missing] = 0.25 * sum(flat[places] for places in near)
         return mean
+
+
+def _places(values: Array, y: Array, x: Array) -> Array:
+    """Return the numbers of points of an array; those beyond an edge are its points."""
+    return np.ravel_multi_index((y, x), values.shape, mode="clip")
 
 
 def _halved(values: Array) -> Array:

@@ -224,13 +224,11 @@ def _tapered(heights: Array, lattice: Lattice, observed: Array) -> tuple[Lattice
 
     The middle of a large surface serves if most of it was observed. A whole periodic surface needs no taper.
     """
-    edge = LARGEST_CROP ** (3 - lattice.axes)
-    middle = middle_slices(heights.shape, edge)
-    is_part = max(heights.shape) > edge and bool(observed[middle].mean() > 0.5)
+    middle = middle_slices(heights.shape, LARGEST_CROP ** (3 - lattice.axes))
+    is_part = observed[middle].size < observed.size and bool(observed[middle].mean() > 0.5)
     if lattice.periodic and not is_part:
         return lattice, lattice.power(heights)
-    if is_part:
-        heights = heights[middle]
+    heights = heights[middle] if is_part else heights
     if lattice.axes == 2:  # offsets of rows and columns are in none of the modes
         heights = heights - heights.mean(axis=0) - heights.mean(axis=1, keepdims=True)
     tapers = [window_weights(n, None if n == 1 else "hann") for n in heights.shape]
