@@ -1,6 +1,7 @@
 """Scenes for usual questions: what they ask for, and the commands that run them."""
 
 import re
+import shutil
 import tomllib
 
 import numpy as np
@@ -14,13 +15,20 @@ from fractalcontact.cli import main
 HURST = 0.7
 
 
+@pytest.fixture(scope="module")
+def faces(tmp_path_factory):
+    """Write two mated faces of 64 x 64 points, the upper one 0.1 mm above; return their files."""
+    folder = tmp_path_factory.mktemp("faces")
+    lower = fc.surfaces.fbm((64, 64), 2e-4, hurst=HURST, rms_increment=1e-5, rng=3)
+    return fc.save(lower, folder / "lower.nc"), fc.save(lower + 1e-4, folder / "upper.nc")
+
+
 @pytest.fixture
-def scans(tmp_path, monkeypatch):
-    """Write two mated faces of 96 x 96 points, the upper one 0.1 mm above, and work in their folder."""
+def scans(tmp_path, monkeypatch, faces):
+    """Work in a folder with copies of the two faces."""
     monkeypatch.chdir(tmp_path)
-    lower = fc.surfaces.fbm((96, 96), 2e-4, hurst=HURST, rms_increment=1e-5, rng=3)
-    fc.save(lower, tmp_path / "lower.nc")
-    fc.save(lower + 1e-4, tmp_path / "upper.nc")
+    for path in faces:
+        shutil.copy(path, tmp_path)
     return tmp_path
 
 
@@ -243,7 +251,7 @@ def test_wrong_questions(scans, arguments, options, problem):
 
 
 def test_single_face_is_levelled_and_says_so(scans, capsys):
-    """A plane of slope .02 over 19.2 mm: a tilt of 1.15 degree, and 128 µm of the rms height."""
+    """A plane of slope .02 over 12.8 mm: a tilt of 1.15 degree, and 74 µm of the rms height."""
     lower = fc.open("lower.nc")
     tilted = (lower + 0.02 * lower.x).rename("height")
     tilted["x"].attrs.pop("period", None)
@@ -295,7 +303,7 @@ def test_scan_on_itself_shows_zeros_and_no_rounding(tmp_path, capsys):
 def test_spikes_of_a_roughness_scan(scans, capsys):
     """Twenty false points: said with D and JRC without them, and gone with --despike."""
     lower = fc.open("lower.nc").load()
-    rows, columns = np.random.default_rng(1).integers(2, 94, (2, 20))
+    rows, columns = np.random.default_rng(1).integers(2, 62, (2, 20))
     spiked = lower.copy(deep=True)
     spiked.values[rows, columns] += 2e-3
     fc.save(spiked, "spiked.nc")
@@ -325,7 +333,7 @@ def test_jrc_below_its_scale_is_said_in_words(scans, capsys):
     """Nearly smooth: the regression gives negative numbers, which no table and no remark shows."""
     smooth = 1e-2 * fc.open("lower.nc").load()
     spiked = smooth.copy(deep=True)
-    rows, columns = np.random.default_rng(1).integers(2, 94, (2, 25))
+    rows, columns = np.random.default_rng(1).integers(2, 62, (2, 25))
     spiked.values[rows, columns] += 1e-3  # not on a lattice, whose waves are looked for
     fc.save(smooth, "smooth.nc")
     fc.save(spiked, "spiked.nc")
@@ -346,7 +354,7 @@ def test_swapped_faces_are_refused(scans, capsys):
 
 def test_share_of_missing_points_is_said(scans, capsys):
     lower = fc.open("lower.nc")
-    fc.save(lower.where((lower.x > 2e-3) | (lower.y > 9.6e-3)), "gaps.nc")
+    fc.save(lower.where((lower.x > 2e-3) | (lower.y > 6.4e-3)), "gaps.nc")
     share = 100 * float(fc.open("gaps.nc").isnull().mean())
     assert main(["roughness", "gaps.nc"]) == 0
     assert f"{share:.3g} % of the points are missing" in capsys.readouterr().out
