@@ -1,3 +1,6 @@
+import functools
+from pathlib import Path
+
 import plotting_synthetic
 import pytest
 
@@ -16,6 +19,16 @@ def one_process():
         yield
 
 
+@pytest.fixture(autouse=True, scope="session")
+def one_parser():
+    """Read each formula once: a figure has a renderer of its own, which would read all of them again."""
+    from matplotlib.backends import backend_agg
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(backend_agg, "MathTextParser", functools.cache(backend_agg.MathTextParser))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def _style_of_the_files():
     """Draw in the style of the files; close what pyplot keeps."""
@@ -24,3 +37,13 @@ def _style_of_the_files():
     with plt.style.context("fractalcontact.plotting.report"):
         yield
     plt.close("all")
+
+
+@pytest.fixture
+def empty_files(monkeypatch):
+    """Write the files of figures empty: neither are panels arranged, nor are pixels drawn."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda _, path, **options: Path(path).touch())
+    monkeypatch.setattr(ConstrainedLayoutEngine, "execute", lambda _, figure: None)

@@ -119,6 +119,7 @@ def test_a_scan_has_one_row_in_all_panels():
         assert all(right.x0 > left.x1 + 4 for left, right in itertools.pairwise(boxes))
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_csv_beside_the_figures(study, tmp_path):
     tree = xr.DataTree.from_dict({"/joints/closure": study["joints/closure"].to_dataset()})
     files = plotting.draw(tree, tmp_path, formats=["png", "csv"], units={"normal_force": "N"})

@@ -77,12 +77,13 @@ def test_complete_study(written):
         ((), []),
     ],
 )
-def test_part_of_a_study(study, tmp_path, monkeypatch, paths, expected):
+@pytest.mark.usefixtures("empty_files")
+def test_part_of_a_study(study, tmp_path, paths, expected):
     """The files that are written; the test above draws what is in them."""
-    monkeypatch.setattr(FigureCanvasAgg, "print_png", lambda _, path, **options: Path(path).touch())
     assert names(plotting.draw(part(study, *paths), tmp_path)) == expected
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_study_without_a_joint(study, tmp_path):
     pressed = study["joints/closure"].to_dataset().isel(shear=0, drop=True)
     tree = xr.DataTree.from_dict({"/contact": pressed})
@@ -92,6 +93,7 @@ def test_study_without_a_joint(study, tmp_path):
     assert names(plotting.draw(tree, tmp_path)) == ["closure_law", "contact_area"]
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_figure_along_the_path_that_a_result_states(study, tmp_path):
     states = study["joints/closure"].to_dataset()["state"]
     percolation = fc.domains.percolation(states)
@@ -103,12 +105,14 @@ def test_figure_along_the_path_that_a_result_states(study, tmp_path):
     assert plotting.draw(of_one_state, tmp_path) == []
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_closure_without_maps(study, tmp_path):
     tree = part(study, "joints/closure")
     tree["joints/closure"] = tree["joints/closure"].to_dataset().drop_vars("state")
     assert names(plotting.draw(tree, tmp_path)) == ["joint_closure", "joint_contact_area"]
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_letters_match_between_curve_and_maps(study, tmp_path, monkeypatch):
     """The steps that are marked on the closure law are those of the maps of contact domains."""
     shown = {}
@@ -126,6 +130,7 @@ def test_letters_match_between_curve_and_maps(study, tmp_path, monkeypatch):
     assert on_the_curve == on_the_maps == list("ABCD")
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_shear_curve_of_tests_and_of_the_criterion(tmp_path):
     dims = ("nominal_pressure", "shear_displacement")
     coords = {"nominal_pressure": [1e6], "shear_displacement": [0.0, 1e-3]}
@@ -135,6 +140,7 @@ def test_shear_curve_of_tests_and_of_the_criterion(tmp_path):
         assert names(plotting.draw(xr.DataTree.from_dict(groups), tmp_path)) == ["shear_curve"]
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_several_directions_under_force(tmp_path):
     opening = synthetic.dilatancy(shears=np.linspace(0, 8e-4, 5))
     tree = xr.DataTree.from_dict(

@@ -66,6 +66,11 @@ def study(factors):
     return xr.DataTree.from_dict({"contact": pressed})
 
 
+def areas(tree):
+    """Return the tree with the contact areas alone, of which one figure is drawn."""
+    return tree.map_over_datasets(lambda dataset: dataset.drop_vars(["state", "closure"], errors="ignore"))
+
+
 def test_curves_are_the_median_bands_the_quantiles_and_maps_name_their_member(drawn):
     figures = drawn(study(FACTORS))
     assert figures["contact_domains"][2] == "member 0 of 5"
@@ -82,12 +87,13 @@ def test_curves_are_the_median_bands_the_quantiles_and_maps_name_their_member(dr
 def test_maps_name_their_member_beside_the_colours_of_their_flags(drawn):
     tree = study(FACTORS)
     tree["contact/state"].values[:, 2, 0, 0] = 2  # yielded: the flags have a legend below the maps
+    tree["contact"] = tree["contact"].to_dataset()[["state"]].drop_vars("closure")
     assert drawn(tree)["contact_domains"][2] == "member 0 of 5"
 
 
 def test_bands_of_a_path_that_turns_back_are_those_of_its_legs(drawn):
     """An outline that is run through to and fro encloses nothing."""
-    tree = study(FACTORS)
+    tree = areas(study(FACTORS))
     back = xr.DataTree.from_dict({"contact": tree["contact"].to_dataset().isel(step=[0, 1, 2, 1, 0])})
     (one, other), legs = drawn(tree)["contact_area"][1], drawn(back)["contact_area"][1]
     assert len(legs) == 4
@@ -97,7 +103,7 @@ def test_bands_of_a_path_that_turns_back_are_those_of_its_legs(drawn):
 
 def test_bands_do_not_need_the_same_lines_of_reference(drawn):
     """The forces of a high quantile may need logarithmic axes, where those of the median do not."""
-    pressed = study(FACTORS)["contact"].to_dataset()
+    pressed = areas(study(FACTORS))["contact"].to_dataset()
     force = np.tile(FORCES, (FACTORS.size, 1))
     force[-1, -1] = 400
     loaded = pressed.assign_coords(normal_force=(("member", "step"), force, {"units": "N"}))
@@ -108,7 +114,9 @@ def test_bands_do_not_need_the_same_lines_of_reference(drawn):
 
 def test_band_has_the_unit_of_the_axis(drawn):
     # closures from nanometres to hundreds of micrometres: each alone would have another prefix
-    curves, bands, _ = drawn(study(np.array([1e-4, 1.0, 1e3])))["closure_law"]
+    tree = study(np.array([1e-4, 1.0, 1e3]))
+    tree["contact"] = tree["contact"].to_dataset().drop_vars("state")
+    curves, bands, _ = drawn(tree)["closure_law"]
     low, middle, high = np.quantile([1e-4, 1.0, 1e3], [0.16, 0.5, 0.84])
     shown = next(curve for curve in curves if len(curve) == 3)[0, 0]
     assert bands[0][0, 0] / shown == pytest.approx(low / middle)
@@ -126,7 +134,7 @@ def test_band_from_no_load_on_draws_without_warning(drawn, recwarn):
     """On a logarithmic axis the first point, at which nothing touches, is beyond the limits."""
     faces = fc.surfaces.spectral((16, 16), 1e-5, hurst=0.8, rms_slope=0.05, members=3, rng=5)
     pressed = fc.contact.press(faces, contact_modulus=1e10, nominal_pressure=[0.0, 1.0, 1e7], keep="state")
-    assert "contact_area" in drawn(xr.DataTree.from_dict({"contact": pressed}))
+    assert "contact_area" in drawn(areas(xr.DataTree.from_dict({"contact": pressed})))
     assert [str(warning.message) for warning in recwarn if "non-positive" in str(warning.message)] == []
 
 

@@ -235,6 +235,7 @@ def test_heat_maps_of_lacunarity_have_the_values_and_edges():
     assert numbers == [0, 1, 2, 3]  # there is no state 0.5
 
 
+@pytest.mark.usefixtures("empty_files")
 def test_a_study_draws_its_evolution(measured, tmp_path):
     path = nested()
     groups = {
