@@ -30,6 +30,11 @@ def rough_crack(make_face, rough):
     return fc.joints.Crack(face, young=3e10, poisson=0.2, block=24e-4, basic_friction_angle=FRICTION)
 
 
+@pytest.fixture(scope="module")
+def there_and_back(rough_crack):
+    return sheared(rough_crack, [5e-4, 0.0], [2e6, 2e7])
+
+
 def sheared(crack, path, pressure=5e6, **options):
     options = {"hardness": 2e8} | options
     result = fc.joints.direct_shear(crack, path, nominal_pressure=pressure, **options)
@@ -52,17 +57,17 @@ def test_teeth_climb_until_their_flanks_yield(teeth):
     assert test.wear_depth.values[8] > 1e-6
 
 
-def test_work_of_wear_is_hardness_times_volume(rough_crack):
-    test = sheared(rough_crack, 5e-4, [2e6, 2e7])
+def test_work_of_wear_is_hardness_times_volume(rough_crack, there_and_back):
+    test = there_and_back
     volume = test.wear_depth * rough_crack.nominal_area
     np.testing.assert_allclose(test.plastic_work, 2e8 * volume, rtol=1e-9)
     assert (test.wear_depth.values[:, -1] > 0).all()
     assert (np.diff(test.wear_depth.values, axis=1) >= 0).all()
 
 
-def test_shear_dissipates_at_least_friction_and_wear(rough_crack):
+def test_shear_dissipates_at_least_friction_and_wear(rough_crack, there_and_back):
     # T dv - N dz is the heat of friction P mu (1 + d^2) dv and the work of wear, if no elastic energy changed
-    test = sheared(rough_crack, [5e-4, 0.0], [2e6, 2e7])
+    test = there_and_back
     slip = np.diff(test.shear.values)
     work = np.cumsum(test.shear_stress.values[:, 1:] * slip, axis=1)
     lift = test.nominal_pressure.values[:, None] * test.dilatancy.values[:, 1:]
@@ -91,7 +96,7 @@ def test_residual_faces_have_lost_the_worn_volume(rough_crack):
 
 
 def test_friction_falls_with_the_pressure(rough_crack):
-    test = sheared(rough_crack, 5e-4, [1e6, 4e6, 1.6e7, 6.4e7])
+    test = sheared(rough_crack, 5e-4, [1e6, 8e6, 6.4e7])
     angles = test.peak_friction_angle.values
     assert (np.diff(angles) < -1).all()
     assert angles[-1] > FRICTION
@@ -158,8 +163,8 @@ def test_a_direction_that_is_rounded_stays_on_the_grid(make_face, rough):
 
 
 def test_a_stop_on_the_way_changes_nothing(rough_crack):
-    straight = sheared(rough_crack, [4e-4, 0.0], [2e6, 2e7])
-    stopped = sheared(rough_crack, [1e-4, 4e-4, 3e-4, 0.0], [2e6, 2e7])
+    straight = sheared(rough_crack, [4e-4, 0.0], 2e7)
+    stopped = sheared(rough_crack, [1e-4, 4e-4, 3e-4, 0.0], 2e7)
     xr.testing.assert_identical(*(test.drop_attrs().drop_vars("run_time") for test in (stopped, straight)))
     assert end_of_first_leg(stopped) == end_of_first_leg(straight) == "400 µm"
 
@@ -205,8 +210,8 @@ def test_a_joint_that_locks_on_its_way_has_no_strength(make_face):
     x = np.arange(60)
     lower = np.clip(x - 30, 0, 3) * 3e-4
     upper = np.where(x >= 28, 9e-4, 0.0)
-    faces = (make_face(np.tile(face, (24, 1)), 1e-4, periodic=(True, False)) for face in (lower, upper))
-    crack = fc.joints.Crack(*faces, young=1e22, poisson=0.2, block=(24e-4, 4e-3), basic_friction_angle=35)
+    faces = (make_face(np.tile(face, (8, 1)), 1e-4, periodic=(True, False)) for face in (lower, upper))
+    crack = fc.joints.Crack(*faces, young=1e22, poisson=0.2, block=(8e-4, 4e-3), basic_friction_angle=35)
     test = sheared(crack, 9e-4, 1e5, hardness=1e24).isel(nominal_pressure=0)
     assert np.isfinite(test.shear_stress.values).tolist() == [True] * 5 + [False] * 6
     for name in ("peak_shear_strength", "peak_friction_angle", "residual_shear_strength"):

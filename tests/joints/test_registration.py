@@ -55,7 +55,7 @@ def test_known_shift_is_recovered(make_face, rough, shift):
 
 @pytest.mark.parametrize("angle", [6.0, 20.0])
 def test_rotation_beyond_a_few_degrees_is_refused(make_face, rough, angle):
-    lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle))
+    lower, upper = (make_face(face, S) for face in moved_pair(rough, (2.0, -3.0), angle=angle, size=90))
     if angle > 10:
         # too far for the first guess: an error, or a warning that the position is not determined
         with pytest.raises((ValueError, ConvergenceWarning), match="turned by a few degrees at most"):
@@ -75,7 +75,7 @@ def test_unobserved_heights_stay_missing(make_face, rough):
 
 @pytest.mark.parametrize("angle", [0.7, -3.0])
 def test_known_rotation_is_recovered(make_face, rough, angle):
-    lower, upper = moved_pair(rough, (0.0, 0.0), angle=angle)
+    lower, upper = moved_pair(rough, (0.0, 0.0), angle=angle, size=90)
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
     assert result.rotation == pytest.approx(angle, abs=0.01)
     assert np.hypot(result.shift_x, result.shift_y) < 0.02 * S
@@ -130,7 +130,7 @@ def test_missing_heights_and_damage(make_face, rough):
 
 
 def test_units_of_height_change_nothing(make_face, rough):
-    lower, upper = moved_pair(rough, (1.5, -2.0), noise=0.02)
+    lower, upper = moved_pair(rough, (1.5, -2.0), noise=0.02, size=80)
     result = fc.joints.register(make_face(lower, S), make_face(upper, S))
     scaled = fc.joints.register(make_face(lower * 2.0**30, S), make_face(upper * 2.0**30, S))
     assert scaled.shift_x == result.shift_x
@@ -147,7 +147,7 @@ def test_registered_pair_makes_a_crack(make_face, rough):
 
 
 def test_invalid_arguments_are_refused(make_face, rough):
-    lower, upper = moved_pair(rough, (0.0, 0.0))
+    lower, upper = moved_pair(rough, (0.0, 0.0), size=60)
     x = np.indices(lower.shape)[1] * 1.0
     for bad in (np.zeros_like(lower), 0.1 * x, np.sin(0.3 * x)):
         with pytest.raises(ValueError, match="fixes the position"):
@@ -163,7 +163,7 @@ def test_invalid_arguments_are_refused(make_face, rough):
 
 
 def test_unequal_spacings_without_rotation(make_face, rough):
-    lower, upper = moved_pair(rough, (1.5, -2.0))
+    lower, upper = moved_pair(rough, (1.5, -2.0), size=80)
     result = fc.joints.register(make_face(lower, (S, 2 * S)), make_face(upper, (S, 2 * S)), rotation=False)
     assert result.shift_y / S == pytest.approx(1.5, abs=2e-3)
     assert result.shift_x / (2 * S) == pytest.approx(-2.0, abs=2e-3)
@@ -321,7 +321,7 @@ def test_motion_is_recovered_with_noise_and_gaps(make_face, rough, seed):
 
 
 def test_swapped_faces_are_refused(make_face, rough):
-    lower, upper = (make_face(face, S) for face in moved_pair(rough, (3.0, -2.0), noise=0.02))
+    lower, upper = (make_face(face, S) for face in moved_pair(rough, (3.0, -2.0), noise=0.02, size=80))
     assert fc.joints.register(lower, upper).aperture.mean() > 0
     with pytest.raises(ValueError, match=r"swap lower and upper.*mean aperture of -0\.0005 m"):
         fc.joints.register(upper, lower)
@@ -332,7 +332,7 @@ def test_swapped_faces_are_refused(make_face, rough):
 
 @pytest.mark.parametrize("axis", [pytest.param("x", marks=pytest.mark.slow), "y"])
 def test_face_scanned_face_up_is_recognised_and_turned_over(make_face, rough, axis):
-    lower, upper = moved_pair(rough, (3.0, -2.0), noise=0.02, size=90)
+    lower, upper = moved_pair(rough, (3.0, -2.0), noise=0.02, size=70)
     turned = -upper[::-1] if axis == "x" else -upper[:, ::-1]
     faces = make_face(lower, S), make_face(turned, S)
     with pytest.raises(ValueError, match=f"scanned face up: it fits with turn_upper='{axis}'"):

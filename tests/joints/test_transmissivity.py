@@ -228,7 +228,7 @@ def slow_winding(cells):
 def test_percolation_on_a_torus_is_winding(make_face):
     rng = np.random.default_rng(3)
     seen = set()
-    for _ in range(60):
+    for _ in range(30):
         gap = (rng.random((6, 7)) < 0.6).astype(float)
         result = flow(make_face, gap, periodic=True)
         expected = [slow_winding(gap > 0), slow_winding(gap.T > 0)]
