@@ -76,10 +76,12 @@ def test_null_of_planes_with_as_many_cells_is_that_of_each_alone(cover):
 
 
 CASES = [  # cells a side, coverage, sizes, cover; the expected counts must scatter, not be one or all
-    (40, 0.05, None, "mean"),
-    (64, 0.2, None, "mean"),
+    (40, 0.2, None, "mean"),
     (64, 0.01, [1, 2, 3, 5, 8], "mean"),
     (45, 0.1, [1, 2, 3, 5, 8], "aligned"),
+    (40, 0.05, None, "aligned"),
+    (40, 0.05, None, "mean"),
+    (64, 0.2, None, "mean"),
     (64, 0.05, None, "aligned"),
     *[(96, coverage, None, "mean") for coverage in (0.005, 0.05, 0.2, 0.5)],
     *[(96, coverage, [1, 2, 3, 4, 6, 9, 14], "mean") for coverage in (0.005, 0.02, 0.5)],
@@ -89,7 +91,7 @@ CASES = [  # cells a side, coverage, sizes, cover; the expected counts must scat
 
 @pytest.mark.parametrize(
     ("n", "coverage", "sizes", "cover"),
-    [pytest.param(*case, marks=[] if k < 5 else pytest.mark.slow) for k, case in enumerate(CASES)],
+    [pytest.param(*case, marks=[] if k < 4 else pytest.mark.slow) for k, case in enumerate(CASES)],
 )
 @pytest.mark.parametrize("wraps", [False, True])
 def test_null_spread_is_the_scatter_of_realisations(n, coverage, sizes, cover, wraps):
@@ -111,12 +113,13 @@ def test_null_spread_with_single_cells_missing_is_the_scatter_of_realisations(co
     rng = np.random.default_rng(33)
     valid = rng.random((60, 60)) < 0.7
     places = np.flatnonzero(valid)
-    planes = np.zeros((400, 60 * 60), bool)
+    planes = np.zeros((150, 60 * 60), bool)
     for plane in planes:
         plane[rng.choice(places, int(coverage * places.size), replace=False)] = True
     wraps = (True, True)
     masks, seen = as_mask(planes.reshape(-1, 60, 60), periodic=wraps), as_mask(valid, periodic=wraps)
     result = fc.domains.box_dimension(masks, cover=cover, valid=seen)
+    # the scatter of 150 has an error of 5.8 %
     assert float(result.null_spread[0]) == pytest.approx(result.box_dimension.values.std(ddof=1), rel=0.2)
 
 

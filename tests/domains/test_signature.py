@@ -127,7 +127,7 @@ def test_groups_of_spots_cluster():
 @pytest.mark.parametrize("keep", [0.5, pytest.param(0.6, marks=pytest.mark.slow), 0.7])
 def test_cascades_have_their_dimension(keep):
     """Over 8 to 32 cells of a cascade from 4 to 256: the mean cover is biased upwards by spots and gaps."""
-    planes = np.array([cascades(seed, [keep], finest=4)[0] for seed in range(6)])
+    planes = np.array([cascades(seed, [keep], finest=4)[0] for seed in range(4)])
     result = signature(planes, window=(8, 32))
     assert float(result.domain_dimension.mean()) == pytest.approx(2 + np.log2(keep), abs=0.12)
     assert (result.clustering.sel(scale=32) > 1.15).all()
