@@ -25,7 +25,10 @@ def verdict(case):
     return [line for line in judge(case, result) if int(line.split()[1][:-1]) not in excused], len(excused)
 
 
-@pytest.mark.parametrize("tens", range(0, 120, 20))
+# each kind of heights four times, or six
+@pytest.mark.parametrize(
+    "tens", [pytest.param(tens, marks=[] if tens < 80 else pytest.mark.slow) for tens in range(0, 120, 20)]
+)
 def test_small_random_problems(tens):
     wrong = {seed: verdict(draw(seed, largest=40))[0] for seed in range(tens, tens + 20)}
     assert {seed: lines for seed, lines in wrong.items() if lines} == {}
@@ -69,7 +72,7 @@ def test_judge_detects_errors():
         assert judge(case, spoilt), name
 
 
-@pytest.mark.parametrize("seed", range(200, 224))
+@pytest.mark.parametrize("seed", range(200, 220))
 def test_random_problems_in_binary_units(seed):
     case = draw(seed, largest=64)
     metre, pascal = 2.0**-13, 2.0**11
@@ -92,7 +95,7 @@ def test_random_problems_in_binary_units(seed):
         np.testing.assert_array_equal(case.press()["pressure"], ours["pressure"])
 
 
-@pytest.mark.parametrize("seed", range(300, 324))
+@pytest.mark.parametrize("seed", range(300, 320))
 def test_elimination_matches_fast_on_random_problems(seed):
     case = draw(seed, largest=16)
     case.options.pop("hardness", None)
