@@ -10,6 +10,7 @@ import warnings
 from pathlib import Path
 
 import pytest
+from copies import copied_command
 
 from fractalcontact.base import resources
 from fractalcontact.base.process import calls_in_two_processes, peak_memory
@@ -31,8 +32,8 @@ def test_dask_is_not_imported_to_save_a_result(tmp_path):
         "fc.save(surface, sys.argv[1])\n"
         "print([name for name in sys.modules if name.startswith(('dask.', 'distributed'))])\n"
     )
-    command = [sys.executable, "-c", code, str(tmp_path / "surface.nc")]
-    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    done = copied_command(tmp_path / "surface.nc", program=code)
+    assert (done.stdout.strip(), done.returncode) == ("[]", 0), done.stderr
 
 
 def test_only_a_command_of_its_own_process_collects_rarely():
