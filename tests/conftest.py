@@ -85,12 +85,12 @@ def measured():
 
 
 def _remembering(function):
-    """Return a function of a dataset that keeps its result for the last one it was called with."""
+    """Return a function or method of a dataset that keeps its result for the last one it was called with."""
     last = [None, None]
 
-    def remember(dataset):
-        if last[0] is not dataset:
-            last[:] = dataset, function(dataset)
+    def remember(*owner_and_dataset):
+        if last[0] is not owner_and_dataset[-1]:
+            last[:] = owner_and_dataset[-1], function(*owner_and_dataset)
         return copy.copy(last[1])
 
     return remember
@@ -113,11 +113,15 @@ def compliance():
 
         CheckSuite.load_all_available_checkers()
         from compliance_checker.cf import util
+        from compliance_checker.cf.cf_base import CFBaseCheck
 
     # the checker looks for the axes of a file thousands of times, and reads its table of names for each file
     for name, function in inspect.getmembers(util, inspect.isfunction):
         if name.startswith("get_") and len(inspect.signature(function).parameters) == 1:
             setattr(util, name, _remembering(function))
+    for name in ("ancillary", "coord", "geophysical"):  # looked for again wherever there are none
+        name = f"_find_{name}_vars"
+        setattr(CFBaseCheck, name, _remembering(getattr(CFBaseCheck, name)))
     util.StandardNameTable = functools.cache(util.StandardNameTable)
 
     def findings(path):

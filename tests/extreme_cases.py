@@ -293,7 +293,7 @@ _CALLS = (
     ),
     _call(
         "a very long path",
-        "2000 steps between two loads: no drift, no more memory than the numbers kept",
+        "1000 steps between two loads: no drift, no more memory than the numbers kept",
         inputs.long_path,
         {"contact.press.drift": (0.0, 1e-6), "contact.press.kilobytes_a_step": (0.0, 1.0)},
     ),

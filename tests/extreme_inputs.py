@@ -227,8 +227,8 @@ def yielded_spikes() -> xr.Dataset:
 
 
 def long_path() -> xr.Dataset:
-    """Return how far closures drift over 2000 steps between two loads, and the bytes kept for each step."""
-    path = np.tile([1e4, 1e5], 1000)
+    """Return how far closures drift over 1000 steps between two loads, and the bytes kept for each step."""
+    path = np.tile([1e4, 1e5], 500)
     pressed = contact.press(white_noise((8, 8)), contact_modulus=MODULUS, nominal_pressure=path, keep=())
     closure = pressed["closure"].values
     return _numbers(

@@ -19,9 +19,15 @@ def failed(case, only=""):
     return [result for result in examine(case, only) if not result.passed]
 
 
+# the heights are those of "E* = 1 Pa": what does not take a modulus would see the same input again
+OTHER_MODULI = "E* = 1e-6 Pa", "E* = 1e15 Pa"
+TAKE_A_MODULUS = "contact.", "joints."
+
+
 @pytest.mark.parametrize("name", list(CASES))
 def test_case_gives_the_expected_values(name):
-    wrong = failed(CASES[name])
+    parts = TAKE_A_MODULUS if name in OTHER_MODULI else ("",)
+    wrong = [result for part in parts for result in failed(CASES[name], part)]
     assert not wrong, "\n".join(map(str, wrong))
 
 

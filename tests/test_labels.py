@@ -29,7 +29,7 @@ MORE = {
 
 def result_of(name):
     """Return the result of a call with all that it may return."""
-    return function_of(name)(**(CALLS[name]() | MORE.get(name, {})))
+    return function_of(name)(**(CALLS[name]() | MORE[name])) if name in MORE else calls.result_of(name)
 
 
 def stack():

@@ -20,7 +20,10 @@ WRONG = (
 # the quickest of what an argument chooses between: most values are passed on to a whole call
 QUICK = {
     "dimensions.estimate": {"methods": "variogram"},
+    "joints.area_by_resolution": {"normal_force": [1.0]},
     "joints.dilatancy": {"shear": [0.0, 1e-4], "direction": "E"},
+    "joints.direct_shear": {"path": 1e-4},
+    "joints.shear_curve": {"displacement": [0.0, 1e-4], "nominal_pressure": [1e5]},
     "surfaces.sample": {"name": "nothing"},
 }
 
