@@ -10,7 +10,7 @@ import xarray as xr
 
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.schema import CORE_DIMS
-from fractalcontact.base.validation import NONE, Problems
+from fractalcontact.base.validation import NONE, Problems, Words, require
 from fractalcontact.plotting._units import Quantity, Units, marked, name_of, require_units, scale_of, shown_in
 
 D = TypeVar("D", xr.Dataset, xr.DataArray)
@@ -47,6 +47,8 @@ def result_of(
     own = {dim for name in names for dim in dataset[name].dims}
     extra = [dim for dim in dataset.dims if dim in PATH_DIMS and dim not in dims and dim in own]
     with Problems("fc.plotting") as problems:
+        expected = "a result or a variable of it"
+        problems.require(len(dataset.data_vars) > 0, argument, expected, Words("a coordinate"))
         for dim in (dim for dim in dims if dim in dataset.variables and dim not in dataset.dims):
             over = dataset[dim].dims  # a variable of this name, as the shear of `direct_shear` over points
             problems.require(not over, argument, f"a result over {dim}", f"one with {dim} over {over}")
@@ -82,7 +84,12 @@ def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
         data = data.to_dataset()
     if isinstance(data, xr.DataArray):
         name = "height" if data.name in (None, "") else data.name
-        data = data.coords.to_dataset() if name in data.coords else data.rename(name).to_dataset()
+        if name in data.dims:
+            data = data.coords.to_dataset()
+        elif name in data.coords:
+            data = data.coords.to_dataset().drop_indexes(name, errors="ignore").reset_coords([name])
+        else:
+            data = data.rename(name).to_dataset()
     with Problems("fc.plotting") as problems:
         expected = "a labelled result (Dataset, DataArray or node of a DataTree)"
         if problems.require(isinstance(data, xr.Dataset), argument, expected, type(data).__name__):
@@ -125,6 +132,7 @@ def require_known_dims(dataset: xr.Dataset, dims: Mapping[str, Sequence[str]]) -
 def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:
     """Return a variable as an array with exactly `dims`, repeated along those it does not have."""
     variable = without(data[name], [dim for dim in data[name].dims if dim not in dims], f"result.{name}")
+    require(variable.dtype.kind in "biuf", f"result.{name}", "numbers", variable.dtype)
     repeated = {dim: data.sizes.get(dim, 1) for dim in dims if dim not in variable.dims}
     variable = variable.expand_dims(repeated)
     return np.asarray(variable.transpose(*dims).values, dtype=np.float64)

@@ -1,4 +1,3 @@
-import functools
 from pathlib import Path
 
 import plotting_synthetic
@@ -16,16 +15,6 @@ def one_process():
     """Draw the figures of a study in this process: a copy of it is made for few of them only."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FRACTALCONTACT_THREADS", "1")
-        yield
-
-
-@pytest.fixture(autouse=True, scope="session")
-def one_parser():
-    """Read each formula once: a figure has a renderer of its own, which would read all of them again."""
-    from matplotlib.backends import backend_agg
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(backend_agg, "MathTextParser", functools.cache(backend_agg.MathTextParser))
         yield
 
 

@@ -53,6 +53,15 @@ def test_array_is_drawn_as_a_map_or_along_its_path():
     assert share.get_ylabel().replace("\n", " ") == "share of the set in its largest island, coverage"
 
 
+def test_coordinates_and_words_are_drawn_or_refused():
+    pressure = pressed()["nominal_pressure"]
+    assert plotting.plot(pressure).get_ylabel().startswith("nominal pressure")
+    with pytest.raises(InvalidInput, match="result: expected a result or a variable of it, got a coordinate"):
+        plotting.plot(result_of("joints.shear_curve")["nominal_pressure"])
+    with pytest.raises(InvalidInput, match=r"result.reason: expected numbers, got dtype\('<U"):
+        plotting.plot(result_of("domains.signature")["reason"])
+
+
 def test_docstring_has_every_kind_and_its_options():
     """Kinds without a function of their own are described, with every option that they have."""
     text = plotting.plot.__doc__
