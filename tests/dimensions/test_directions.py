@@ -1,8 +1,11 @@
 """Roughness by direction: surfaces of known anisotropy, invariances, and the size of the tests."""
 
+import functools
+
 import numpy as np
 import pytest
 import xarray as xr
+from counting import at_least
 from scipy.ndimage import gaussian_filter
 from scipy.stats import binom
 
@@ -23,6 +26,20 @@ def anisotropic(n, seed, anisotropy_ratio=2.0, azimuth=30.0, hurst=0.6, thin=4, 
         anisotropy_ratio=anisotropy_ratio, direction=azimuth, rng=seed, **options,
     )  # fmt: skip
     return fc.surfaces.from_array(complete.values[: thin * n : thin, : thin * n : thin], SPACING)
+
+
+@functools.cache
+def of_a_small_surface():
+    """Return a surface and its directions, made once."""
+    surface = brownian(64, 0.5, 1)
+    return surface, fc.dimensions.directions(surface)
+
+
+@functools.cache
+def white_noise(n, seed):
+    """Return white noise and its directions, made once."""
+    white = fc.surfaces.from_array(np.random.default_rng(seed).standard_normal((n, n)), SPACING)
+    return white, fc.dimensions.directions(white)
 
 
 def angle_between(azimuth, second):
@@ -97,8 +114,9 @@ def test_transposed_surface_swaps_azimuths():
 @pytest.mark.parametrize(
     ("size", "is_across", "noise"),
     [
-        (48, False, 1e-7),
-        (160, True, 0.0),
+        (112, True, 0.0),
+        pytest.param(48, False, 1e-7, marks=pytest.mark.slow),
+        pytest.param(160, True, 0.0, marks=pytest.mark.slow),
         pytest.param(160, True, 1e-7, marks=pytest.mark.slow),
         pytest.param(48, True, 1e-7, marks=pytest.mark.slow),
         pytest.param(48, True, 0.0, marks=pytest.mark.slow),
@@ -128,8 +146,8 @@ def test_no_exponent_along_ridges():
 
 def test_ridges_in_noise_have_no_ratio():
     """Ridges as long as the surface have no ratio; the azimuth of the ridges remains."""
-    noise = 1e-7 * np.random.default_rng(7).standard_normal((64, 64))
-    result = fc.dimensions.directions(fc.surfaces.from_array(profile(64, 5)[:, None] + noise, SPACING))
+    noise = 1e-7 * np.random.default_rng(7).standard_normal((48, 48))
+    result = fc.dimensions.directions(fc.surfaces.from_array(profile(48, 5)[:, None] + noise, SPACING))
     assert float(result["isotropy_p_value"]) < 1e-6
     assert np.isnan(result["anisotropy_ratio_high"])
     assert "ridges" in result["anisotropy_ratio"].attrs["reason"]
@@ -178,12 +196,11 @@ def test_band_limited_surface_with_gaps():
 
 
 def test_dtype_and_level_do_not_matter():
-    surface = brownian(64, 0.5, 1)
-    complete = fc.dimensions.directions(surface)["hurst"]
+    surface, complete = of_a_small_surface()
     scaled = [np.rint(surface.values * 1e9).astype(np.int64), (surface.values * 1e6).astype(np.float32)]
     for heights in (*scaled, surface.values * 1e12 + 1e9, surface.values * 1e-3):
         second = fc.dimensions.directions(surface.copy(data=heights))["hurst"]
-        assert second.values == pytest.approx(complete.values, abs=2e-4)
+        assert second.values == pytest.approx(complete["hurst"].values, abs=2e-4)
 
 
 def test_two_exponents_exceed_ratio():
@@ -218,14 +235,13 @@ def test_gaps_and_unequal_spacings():
 
 
 def test_directions_asked_for():
-    surface = brownian(64, 0.5, 13)
+    surface, complete = of_a_small_surface()
     result = fc.dimensions.directions(surface, [210.0, 0.0, 90.0])
     assert result["azimuth"].values == pytest.approx([0.0, 30.0, 90.0])
-    complete = fc.dimensions.directions(surface)
     assert float(result["isotropy_p_value"]) == float(complete["isotropy_p_value"])
-    # a direction has the same value whether or not others are asked for
-    some = fc.dimensions.directions(surface, [0.0, 90.0])
-    assert float(some["hurst"].sel(azimuth=90)) == float(complete["hurst"].sel(azimuth=90))
+    # a direction has the same value whatever others are asked for
+    for azimuth in (0, 90):
+        assert float(result["hurst"].sel(azimuth=azimuth)) == float(complete["hurst"].sel(azimuth=azimuth))
     periodic = fc.surfaces.spectral((64, 64), SPACING, hurst=0.5, rms_height=1e-6, rng=14)
     assert fc.dimensions.directions(periodic, 33.0)["azimuth"].values.tolist() == [33.0]
 
@@ -239,6 +255,12 @@ def measured(n, hurst, seed, noise=0.0, blur=0.0):
     return fc.surfaces.from_array(values + noise, SPACING)
 
 
+@functools.cache
+def of_measured(hurst, seed, noise, blur):
+    """Return the directions of a measured surface of 128 x 128 points, made once."""
+    return fc.dimensions.directions(measured(128, hurst, seed, noise, blur))
+
+
 @pytest.mark.parametrize(
     ("hurst", "noise", "blur"),
     [
@@ -250,7 +272,7 @@ def measured(n, hurst, seed, noise=0.0, blur=0.0):
 )
 def test_noise_and_blur_give_one_exponent_in_all_directions(hurst, noise, blur):
     # over 1, 2 and 4 lattice vectors noise of .3 gave .46 to .64, blur .78 to 1.06
-    results = [fc.dimensions.directions(measured(128, hurst, seed, noise, blur)) for seed in range(4)]
+    results = [of_measured(hurst, seed, noise, blur) for seed in range(4)]
     mean = np.mean([result["fitted_hurst"].values for result in results], axis=0)
     assert np.ptp(mean) < 0.045
     agree = []
@@ -262,13 +284,24 @@ def test_noise_and_blur_give_one_exponent_in_all_directions(hurst, noise, blur):
     assert np.mean(agree) > 0.9
 
 
-@pytest.mark.parametrize("seeds", [range(20, 23), pytest.param(range(23, 28), marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("noise", "blur"), [(0.3, 0.0), (0.0, 0.5), (0.05, 1.0)])
-def test_blur_and_noise_are_in_the_model(noise, blur, seeds):
-    """Second differences would have .65 (noise of 0.3), .88 (blur of 0.5), without a sign of it."""
+@pytest.mark.parametrize(
+    ("hurst", "noise", "blur", "seeds"),
+    [
+        # those of the test above
+        (0.7, 0.3, 0.0, range(4)),
+        (0.3, 0.0, 0.5, range(4)),
+        (0.7, 0.05, 1.0, range(20, 22)),
+        *(
+            pytest.param(0.7, *case, range(20, 28), marks=pytest.mark.slow)
+            for case in ((0.3, 0.0), (0.0, 0.5), (0.05, 1.0))
+        ),
+    ],
+)
+def test_blur_and_noise_are_in_the_model(hurst, noise, blur, seeds):
+    """Second differences of H = .7 had .65 (noise of 0.3), .88 (blur of 0.5), without a sign of it."""
     for seed in seeds:
-        result = fc.dimensions.directions(measured(128, 0.7, seed, noise, blur))
-        held = (result["ci_low"] < 0.7) & (result["ci_high"] > 0.7)
+        result = of_measured(hurst, seed, noise, blur)
+        held = (result["ci_low"] < hurst) & (result["ci_high"] > hurst)
         assert float(held.mean()) > 0.8
         assert float(result["anisotropy_ratio_low"]) == 1.0
         assert (result["rms_increment"].values == pytest.approx(1e-6, rel=0.25)) or noise
@@ -288,7 +321,7 @@ def test_size_of_the_test_with_noise(hurst):
 
 
 def test_stack_equals_single_results():
-    surfaces = brownian(48, 0.5, 15, members=3)
+    surfaces = brownian(48, 0.5, 15, members=2)
     result = fc.dimensions.directions(surfaces)
     assert result["hurst"].dims == ("member", "azimuth")
     assert result["isotropy_p_value"].dims == ("member",)
@@ -312,12 +345,11 @@ def test_limits_and_invalid_arguments():
     assert "constant" in flat["hurst"].attrs["reason"]
     plane = fc.surfaces.from_array(np.broadcast_to(np.arange(20) * 1e-6, (20, 20)), SPACING)
     assert (fc.dimensions.directions(plane)["hurst"] == 1).all()
-    white = fc.surfaces.from_array(np.random.default_rng(17).standard_normal((128, 128)), SPACING)
-    result = fc.dimensions.directions(white)
+    white, result = white_noise(128, 19)
     assert (result["hurst"] < 0.06).all()
     assert float(result["isotropy_p_value"]) > 0.001
     assert np.isnan(result["anisotropy_ratio"])
-    periodic = fc.surfaces.from_array(white.values, SPACING, periodic=True)
+    periodic = fc.surfaces.from_array(white.values[:64, :64], SPACING, periodic=True)
     assert np.isnan(fc.dimensions.directions(periodic)["anisotropy_ratio"])
     with pytest.raises(InvalidInput, match="16"):
         fc.dimensions.directions(brownian(12, 0.5, 1))
@@ -413,17 +445,23 @@ def test_directions_of_a_surface_of_which_little_was_observed(seed):
 
 
 @pytest.mark.parametrize(
-    ("points", "hurst", "missing", "scales"),
+    ("points", "hurst", "missing", "scales", "members", "slack"),
     [
-        pytest.param(40, 0.2, 0.0, None, marks=pytest.mark.slow),
-        pytest.param(40, 0.8, 0.0, None, marks=pytest.mark.slow),
-        (40, 0.2, 0.2, None),
-        (160, 0.6, 0.0, (3e-4, 6e-3)),
+        (48, 0.5, 0.2, None, 8, 0.5),
+        (96, 0.6, 0.0, (3e-4, 6e-3), 8, 0.5),
+        *(
+            pytest.param(*case, 60, 0.3, marks=pytest.mark.slow)
+            for case in (
+                (40, 0.2, 0.0, None),
+                (40, 0.8, 0.0, None),
+                (40, 0.2, 0.2, None),
+                (160, 0.6, 0.0, (3e-4, 6e-3)),
+            )
+        ),
     ],
 )
-@pytest.mark.parametrize(("members", "slack"), [(12, 0.5), pytest.param(60, 0.3, marks=pytest.mark.slow)])
 def test_standard_error_is_the_scatter(points, hurst, missing, scales, members, slack):
-    """Complete, with gaps, and in a window of scales; 12 members are known to 21 %, 60 to 9 %."""
+    """Complete, with gaps, and in a window of scales; 8 members are known to 27 %, 60 to 9 %."""
     surfaces = brownian(points, hurst, 18, members=members)
     surfaces = surfaces.where(np.random.default_rng(19).random((points, points)) >= missing)
     result = fc.dimensions.directions(surfaces, [0.0, 45.0, 90.0], scales=scales)
@@ -453,12 +491,12 @@ def oblique(n, hurst, seed, along_x=(4, 1), along_y=(1, 2)):
 )
 def test_one_exponent_under_an_oblique_lay(lattice, hurst):
     """Cosine modes do not tell a lay at 30 degrees from one at -30: H of .7 was .44, and 4 of 10 held."""
-    surfaces = [oblique(128, hurst, seed, *lattice) for seed in range(4)]
+    surfaces = [oblique(128, hurst, seed, *lattice) for seed in range(3)]
     found = [fc.dimensions.estimate(surface).squeeze() for surface in surfaces]
-    assert sum(bool(each.ci_low < hurst < each.ci_high) for each in found) >= 3
+    assert sum(bool(each.ci_low < hurst < each.ci_high) for each in found) >= 2
     assert np.sqrt(np.mean([(float(each.hurst) - hurst) ** 2 for each in found])) < 0.025
     step = 1e-6 * np.hypot(*lattice[0]) ** hurst
-    assert [float(each.rms_increment) for each in found] == pytest.approx([step] * 4, rel=0.12)
+    assert [float(each.rms_increment) for each in found] == pytest.approx([step] * 3, rel=0.12)
     turned = fc.dimensions.estimate(fc.surfaces.from_array(surfaces[0].values[::-1], SPACING)).squeeze()
     assert float(turned.hurst) == pytest.approx(float(found[0].hurst), abs=3e-3)
 
@@ -486,7 +524,8 @@ def test_surfaces_without_an_oblique_lay_keep_the_cosine_modes():
     def is_oblique(surface):
         return first_fit(read_surfaces(surface)[0]).is_oblique
 
-    assert sum(is_oblique(brownian(64, 0.6, seed)) for seed in range(40)) <= 3  # .4 by chance
+    # .2 by chance; more than 2 have a probability of .001, as had more than 3 of 40
+    assert sum(is_oblique(brownian(64, 0.6, seed)) for seed in range(20)) <= 2
     assert not is_oblique(anisotropic(128, 1, 2.0, 0.0))
     assert is_oblique(oblique(128, 0.6, 1, (2, 1), (0, 1)))
 
@@ -497,24 +536,23 @@ def test_surfaces_without_an_oblique_lay_keep_the_cosine_modes():
 )
 def test_white_noise_has_no_exponent_but_zero(n, seed):
     # azimuths of a few long waves made a blurred lay probable, and one of 128 x 128 ended in a LinAlgError
-    white = fc.surfaces.from_array(np.random.default_rng(seed).standard_normal((n, n)), SPACING)
-    result = fc.dimensions.directions(white)
+    _, result = white_noise(n, seed)
     assert not (result["ci_low"] > 0.01).any()
 
 
 def test_white_noise_without_a_lay_mostly_keeps_its_exponent():
     """One in four (6 of 24) is as probable noise over a surface under a wide blur, H of .2 to .6."""
     # where every surface had a lay, of some ratio, these had .37, .25 and .32
-    whites = (np.random.default_rng(seed).standard_normal((256, 256)) for seed in (16, 17, 18))
-    found = (fc.dimensions.directions(fc.surfaces.from_array(white, SPACING)) for white in whites)
-    assert sum(bool((each["hurst"] < 0.1).all()) for each in found) >= 2
+    found = (white_noise(256, seed)[1] for seed in (17, 18, 16))
+    assert at_least(2, ((each["hurst"] < 0.1).all() for each in found))
 
 
-def test_a_step_keeps_its_interval_and_a_lay_on_another_surface_has_none():
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 3), marks=pytest.mark.slow)])
+def test_a_step_keeps_its_interval_and_a_lay_on_another_surface_has_none(seeds):
     """No metric describes either of them; beside a step lengths hardly differ by azimuth."""
     y, x = np.mgrid[:128, :128] - 64.0
     step = 5.0 * (np.cos(0.4) * x + np.sin(0.4) * y > 13.0)
-    for seed in range(3):
+    for seed in seeds:
         rough = brownian(128, 0.5, seed)
         beside = fc.dimensions.estimate(fc.surfaces.from_array(rough.values + 1e-6 * step, SPACING))
         assert float(beside.ci_low[0]) < 0.5 < float(beside.ci_high[0])
