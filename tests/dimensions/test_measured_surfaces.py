@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from counting import at_least
 from scipy.interpolate import griddata
 from scipy.ndimage import gaussian_filter, gaussian_filter1d, map_coordinates, uniform_filter
 
@@ -116,9 +117,8 @@ def test_coverage(kind):
 @pytest.mark.parametrize("hurst", [0.2, pytest.param(0.5, marks=pytest.mark.slow)])
 def test_rounded_heights_have_no_seams(hurst):
     """Squared steps of rounded heights are few numbers, whose medians jump from line to line."""
-    found = [estimated(0.5 * np.rint(2.0 * brownian(hurst, seed))) for seed in range(5)]
-    held = [float(result.ci_low) <= hurst <= float(result.ci_high) for result in found]
-    assert sum(held) >= 4
+    found = (estimated(0.5 * np.rint(2.0 * brownian(hurst, seed))) for seed in range(5))
+    assert at_least(4, (result.ci_low <= hurst <= result.ci_high for result in found))
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.6])
@@ -142,7 +142,7 @@ def test_what_is_found_is_named():
     assert "noise" in str(rough.note.values)
     waves = estimated(marked(brownian(0.6, 3), 1.0))
     assert "wave" in str(waves.note.values)
-    exact = estimated(brownian(0.6, 3))
+    exact = estimated(brownian(0.6, 3)[:96, :96])
     assert str(exact.note.values) == ""
     assert np.isnan([float(exact.blur_spread), float(exact.noise_height)]).all()
 
@@ -221,8 +221,8 @@ def test_scales_that_leave_out_made_points_give_an_interval(defect):
     change, _ = DEFECTS[defect]
     distance = 2.0 if defect == "enlarged" else 0.2**-0.5  # spacings
     window = (8.0 * distance * SPACING, 200.0 * SPACING)
-    results = [estimated(change(brownian(0.6, seed)), scales=window) for seed in range(8)]
-    assert sum(float(result.ci_low) < 0.6 < float(result.ci_high) for result in results) >= 7
+    results = [estimated(change(brownian(0.6, seed)), scales=window) for seed in range(5)]
+    assert sum(float(result.ci_low) < 0.6 < float(result.ci_high) for result in results) >= 4
     assert all(str(result.reason.values) == "" for result in results)
 
 
@@ -304,12 +304,9 @@ ELONGATED = [(shape, hurst) for shape in ((48, 16), (16, 64), (200, 10)) for hur
 )
 def test_elongated_surfaces(shape, hurst):
     """No mode of few points runs along the short edge alone; H was .995 whatever it should be."""
-    held = []
-    for seed in range(6):
-        surface = fc.surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=STEP, rng=seed)
-        result = fc.dimensions.estimate(surface).isel(method=0)
-        held.append(bool(float(result.ci_low) <= hurst <= float(result.ci_high)))
-    assert sum(held) >= 5
+    surfaces = (fc.surfaces.fbm(shape, SPACING, hurst=hurst, rms_increment=STEP, rng=n) for n in range(4))
+    found = (fc.dimensions.estimate(surface).isel(method=0) for surface in surfaces)
+    assert at_least(3, (each.ci_low <= hurst <= each.ci_high for each in found))
 
 
 @pytest.mark.parametrize("steps", [17.0, pytest.param(5.0, marks=pytest.mark.slow), 3.0])
@@ -324,18 +321,22 @@ def test_rounded_heights_keep_their_interval_when_levelled(steps):
     assert float(found[1].ci_low) < 0.7 < float(found[1].ci_high)
 
 
-@pytest.mark.parametrize("hurst", [0.2, 0.5, 0.9])
-@pytest.mark.parametrize("corner", [4.0, 8.0])
-def test_a_corner_of_a_few_spacings_is_seen(hurst, corner):
+@pytest.mark.parametrize(
+    ("corner", "hurst"),
+    [(4.0, 0.2), (4.0, 0.5), (4.0, 0.9), (8.0, 0.9)]
+    + [pytest.param(8.0, hurst, marks=pytest.mark.slow) for hurst in (0.2, 0.5)],
+)
+def test_a_corner_of_a_few_spacings_is_seen(corner, hurst):
     """A plateau beyond four spacings looked like white noise: H = .9 had an interval of .01 to .16."""
-    held = 0
-    for seed in range(4):
+
+    def holds(seed):
         surface = fc.surfaces.spectral(
             (2 * N, 2 * N), 1.0, hurst=hurst, rms_height=10.0, rolloff=corner, rng=seed
         )
         result = estimated(surface.values[:N, :N])
-        held += bool(result.ci_low <= hurst <= result.ci_high)
-    assert held >= 3
+        return result.ci_low <= hurst <= result.ci_high
+
+    assert at_least(3, map(holds, range(4)))
 
 
 def test_a_corner_beside_unequal_spacings_is_the_same_along_either_axis():
