@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from counting import at_least
 
 import fractalcontact as fc
 
@@ -58,19 +59,20 @@ def test_stretched_surface_keeps_its_exponent(hurst, axis):
 @pytest.mark.parametrize(("members", "least"), [(5, 3), pytest.param(8, 5, marks=pytest.mark.slow)])
 def test_interval_of_a_sum_of_two_surfaces_holds_the_smaller_exponent(members, least):
     """H = .3 and .8, equal at a lag of 8 spacings; without sums in the model 3 of 24 intervals hold .3."""
-    held = []
-    for seed in range(members):
+
+    def holds(seed):
         rough = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.3, rms_increment=1e-6, rng=seed).values
         step = 1e-6 * 8.0 ** (0.3 - 0.8)
         smooth = fc.surfaces.fbm((128, 128), 1e-4, hurst=0.8, rms_increment=step, rng=100 + seed).values
         found = estimate_one(surface_of(rough + smooth, 1e-4))
-        held.append(bool(found.ci_low <= 0.3 <= found.ci_high))
-    assert sum(held) >= least
+        return found.ci_low <= 0.3 <= found.ci_high
+
+    assert at_least(least, map(holds, range(members)))
 
 
 @pytest.mark.parametrize(
     ("hurst", "seeds"),
-    [(0.2, 3), (0.8, 3), *(pytest.param(hurst, 8, marks=pytest.mark.slow) for hurst in (0.2, 0.5, 0.8))],
+    [(0.2, 2), (0.8, 2), *(pytest.param(hurst, 8, marks=pytest.mark.slow) for hurst in (0.2, 0.5, 0.8))],
 )
 def test_surface_and_its_transpose_have_one_estimate(hurst, seeds):
     """Once .252 and .229: modes along one axis alone were left out, those along the other were not."""
@@ -82,7 +84,7 @@ def test_surface_and_its_transpose_have_one_estimate(hurst, seeds):
 
 
 def test_periodic_surface_with_gaps_has_no_interval():
-    for shape in (256, (32, 40)):
+    for shape in (128, (32, 40)):
         surface = fc.surfaces.spectral(shape, 1e-3, hurst=0.6, rms_height=1e-5, short_cutoff=4e-3, rng=35)
         gapped = estimate_one(surface.where(surface.x != surface.x[7]))
         assert np.isfinite(float(gapped.hurst))
@@ -119,7 +121,8 @@ def test_cut_off_below_noise():
     assert str(limited.reason.values[0]) or limited.ci_low.item() < 0.5 < limited.ci_high.item()
 
 
-@pytest.mark.parametrize("members", [14, pytest.param(30, marks=pytest.mark.slow)])
+# of 10 intervals of 95 %, fewer than 9 hold in one case of 12, as do fewer than 12 of 14
+@pytest.mark.parametrize("members", [10, pytest.param(30, marks=pytest.mark.slow)])
 def test_short_rolloff_of_profile(members):
     surfaces = fc.surfaces.spectral(
         512, 1.0, hurst=0.5, rms_height=1.0, rolloff=64.0, short_cutoff=4.0, rng=5, members=members
@@ -138,10 +141,10 @@ def test_smooth_profile_has_no_narrow_interval():
 
 
 def test_smoothest_fractal_profiles_keep_their_interval():
-    profiles = fc.surfaces.fbm(256, 1e-3, hurst=0.95, rms_increment=1e-6, rng=8, members=10)
+    profiles = fc.surfaces.fbm(256, 1e-3, hurst=0.95, rms_increment=1e-6, rng=8, members=6)
     result = estimate(profiles)
     assert (result.fitted_hurst < 1.0).all()
-    assert int(((result.ci_low <= 0.95) & (result.ci_high >= 0.95)).sum()) >= 7
+    assert int(((result.ci_low <= 0.95) & (result.ci_high >= 0.95)).sum()) >= 4
 
 
 def test_checkerboard_is_no_fractal_of_a_narrow_interval():
