@@ -254,17 +254,9 @@ def _crossing(slope: Callable[[float], float]) -> float:
     """Return H at which a slope vanishes; beyond the range of expected curves that of its tangent does."""
     low, high = slope(LOWEST), slope(HIGHEST)
     if low * high < 0.0:
-        # false position (Dowell and Jarratt 1971): slopes are nearly straight lines, and five or six do.
-        # A root finder of scipy.optimize takes .13 s to import
-        start, end, step = LOWEST, HIGHEST, 1.0
-        for _ in range(100):
-            if abs(step) < 1e-7:
-                break
-            step = high * (start - end) / (high - low)
-            value = slope(end + step)
-            start, low = (end, high) if value * high < 0.0 else (start, 0.5 * low)
-            end, high = end + step, value
-        return end
+        from scipy.optimize import brentq
+
+        return float(brentq(slope, LOWEST, HIGHEST, xtol=1e-7))
     end, value = (LOWEST, low) if abs(low) < abs(high) else (HIGHEST, high)
     return end - value * 2.0 * STEP / (slope(end + STEP) - slope(end - STEP))
 
