@@ -267,7 +267,7 @@ def _gridded_points(points: xr.Dataset, request: Request) -> xr.DataArray:
     _warn_of_missing(points["position"].values[..., -1], request.path.name, "points")
     require_readable(np.size(spacing) == 1 or spacing is None, "spacing", "one length for points", spacing)
     step = None if spacing is None else float(np.atleast_1d(spacing)[0])
-    options = {"units": units or stated or "m", "plane": request.plane}
+    options = {"units": _read_points.unit_of(points, units), "plane": request.plane}
     with Problems("", UnreadableFile):  # its problems are those of the file
         from_points.validate(points, step, **options)
         surface = grid_points(points, step, None, **options, largest_gap=None)

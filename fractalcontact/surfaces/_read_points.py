@@ -114,9 +114,16 @@ def read_points(
     source = Path(path)
     with reading("", source):
         points, digest = point_content(source, columns), file_checksum(source)
-    position = in_metres(points["position"], units or points.attrs["stated_unit"] or "m")
+        position = in_metres(points["position"], unit_of(points, units))
     facts = {"parameters": {"path": source.name}, "file_sha256": digest, **points.attrs}
     return points.assign(position=position).assign_attrs(facts)
+
+
+def unit_of(points: xr.Dataset, units: str | None) -> str:
+    """Return the unit of coordinates: that given, else that of the file, else metres."""
+    expected = "None, as each column states its unit"
+    _files.require_readable(units is None or "stated_units" not in points.attrs, "units", expected, units)
+    return units or points.attrs["stated_unit"] or "m"
 
 
 def labelled_points(

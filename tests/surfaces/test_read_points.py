@@ -86,6 +86,11 @@ def test_units_of_columns_are_in_the_provenance(tmp_path):
     np.testing.assert_allclose(points.position, POINTS[:, [0, 2]], atol=1e-15)
     provenance = json.loads(points.attrs["provenance"])
     assert (provenance["stated_unit"], provenance["stated_units"]) == ("mm", ["mm", "um"])
+    for read in (fc.surfaces.read, fc.surfaces.read_points):
+        with pytest.raises(
+            UnreadableFile, match="units: expected None, as each column states its unit, got 'um'"
+        ):
+            read(tmp_path / "trace.csv", units="um")
 
 
 def ply_header(kind, faces):
