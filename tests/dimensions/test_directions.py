@@ -491,12 +491,12 @@ def oblique(n, hurst, seed, along_x=(4, 1), along_y=(1, 2)):
 )
 def test_one_exponent_under_an_oblique_lay(lattice, hurst):
     """Cosine modes do not tell a lay at 30 degrees from one at -30: H of .7 was .44, and 4 of 10 held."""
-    surfaces = [oblique(128, hurst, seed, *lattice) for seed in range(3)]
+    surfaces = [oblique(128, hurst, seed, *lattice) for seed in range(4)]
     found = [fc.dimensions.estimate(surface).squeeze() for surface in surfaces]
-    assert sum(bool(each.ci_low < hurst < each.ci_high) for each in found) >= 2
+    assert sum(bool(each.ci_low < hurst < each.ci_high) for each in found) >= 3
     assert np.sqrt(np.mean([(float(each.hurst) - hurst) ** 2 for each in found])) < 0.025
     step = 1e-6 * np.hypot(*lattice[0]) ** hurst
-    assert [float(each.rms_increment) for each in found] == pytest.approx([step] * 3, rel=0.12)
+    assert [float(each.rms_increment) for each in found] == pytest.approx([step] * 4, rel=0.12)
     turned = fc.dimensions.estimate(fc.surfaces.from_array(surfaces[0].values[::-1], SPACING)).squeeze()
     assert float(turned.hurst) == pytest.approx(float(found[0].hurst), abs=3e-3)
 
@@ -524,8 +524,7 @@ def test_surfaces_without_an_oblique_lay_keep_the_cosine_modes():
     def is_oblique(surface):
         return first_fit(read_surfaces(surface)[0]).is_oblique
 
-    # .2 by chance; more than 2 have a probability of .001, as had more than 3 of 40
-    assert sum(is_oblique(brownian(64, 0.6, seed)) for seed in range(20)) <= 2
+    assert sum(is_oblique(brownian(64, 0.6, seed)) for seed in range(40)) <= 3  # .4 by chance
     assert not is_oblique(anisotropic(128, 1, 2.0, 0.0))
     assert is_oblique(oblique(128, 0.6, 1, (2, 1), (0, 1)))
 

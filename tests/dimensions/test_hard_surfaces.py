@@ -13,7 +13,7 @@ def surface(heights, periodic=False):
     return fc.surfaces.from_array(heights, 1.0, periodic=periodic)
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.slow)])
 def test_interval_of_a_surface_with_most_of_it_missing(count):
     """fBm of H = 1/2, of which the lowest part of a smooth field is missing: 95 % intervals hold H.
 

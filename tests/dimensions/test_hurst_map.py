@@ -165,7 +165,7 @@ def test_no_unit_of_length_moves_a_window():
         fc.dimensions.hurst_map(
             fc.surfaces.from_array(unit * rough, unit), 20.5 * unit, step=8.5 * unit
         ).hurst.shape
-        for unit in (1.0, 1e-3, 7e-5)
+        for unit in (1.0, 1e-3, 7e-5, 0.07, 1.1)
     }
     assert len(shapes) == 1
 
