@@ -37,7 +37,7 @@ _NODES, _IMAGES = 8, 4
 # both sums are exact to 1e-5
 _NARROW = 1.85
 _REACH = 2.6  # longest of these lags over the ratio
-_LAGS = 1 << 8  # at a time: `block_product` then has blocks for one thread
+_LAGS = 1 << 8  # at a time: blocks of `block_product` are then wide
 LARGEST_LOG_RATIO = math.log(16.0)  # of a metric that is fitted: lags in the tables grow with its square
 
 

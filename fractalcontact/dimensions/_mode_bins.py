@@ -67,6 +67,7 @@ def expected_power(lattice: Lattice, theta: Array, form: int, *, edges: bool = T
 def block_product(left: Array, right: Array, *, edge: int = 512, work: int = 1 << 18) -> Array:
     """Return the matrix product, in blocks that BLAS leaves to one thread: more would change last digits."""
     product = np.empty((left.shape[0], right.shape[1]))
+    edge = min(edge, max(1, work // (2 * len(right))))  # two rows at least
     for column in range(0, right.shape[1], edge):
         part = right[:, column : column + edge]
         rows = max(2, work // part.size)
@@ -317,8 +318,9 @@ class Filling:
     """Fill gaps with the mean of their surroundings, of the pyramid of 2 x 2 means.
 
     From coarse to fine a missing mean is interpolated from the next coarser ones, then moved to the mean of
-    its four neighbours some times: the fill is nearly harmonic and has no steps of its own, whose power would
-    be that of short waves. Gaps of a profile are filled by straight lines.
+    its four neighbours some times. The fill has no steps, whose power would be that of short waves. It differs
+    from the harmonic fill by 7 % (rms) in a hole of 50 x 50 points, and by .02 % at single points. Gaps of a
+    profile are filled by straight lines.
 
     Parameters
     ----------
@@ -342,9 +344,10 @@ class Filling:
         """Return sums over weights; where there are none, what the sums of 2 x 2 points fill in."""
         weight, y, x = self.levels[level]
         mean = np.asarray(sums / weight)
-        if y.size == 0 or level + 1 == len(self.levels):
+        if level + 1 == len(self.levels):
             return mean
         coarse = self._means(_halved(sums), level + 1)
+        # the four nearest coarser means, with the weights of a bilinear interpolation
         sides = [((0.75, n // 2), (0.25, n // 2 + n % 2 * 2 - 1)) for n in (y, x)]
         pairs = itertools.product(*sides)
         mean[y, x] = sum(u * v * coarse.take(_places(coarse, i, j)) for (u, i), (v, j) in pairs)
