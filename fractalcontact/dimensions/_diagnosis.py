@@ -190,14 +190,14 @@ def _missing_extremes(heights: Array, edge: int = 15) -> str:
     border = np.concatenate([gaps[0], gaps[-1], gaps[:, 0], gaps[:, -1]])
     owner = np.where(observed, grey_dilation(np.where(np.isin(gaps, border), 0, gaps), (3, 3)), 0)
     count = np.bincount(owner.ravel())
-    beside = count[1:] > 0
-    if np.count_nonzero(beside) < LEAST:
+    numbers = np.flatnonzero(count)[1:]
+    if numbers.size < LEAST:
         return ""
     around = uniform_filter(np.where(observed, heights, 0.0), edge)
     around /= np.maximum(uniform_filter(observed.astype(float), edge), 1e-6)
     deviation = np.where(observed, heights - around, 0.0)
-    means = np.bincount(owner.ravel(), deviation.ravel())[1:][beside] / count[1:][beside]
-    z = float(means.mean() / (means.std(ddof=1) / np.sqrt(means.size)))
+    means = (np.bincount(owner.ravel(), deviation.ravel()) / np.maximum(count, 1))[numbers]
+    z = float(means.mean() / (means.std(ddof=1) / np.sqrt(numbers.size)))
     if not abs(z) > _DEVIATIONS:
         return ""
     which = "low" if z < 0 else "high"

@@ -102,8 +102,7 @@ class FirstFit:
         lattice, theta, form = self.lattice, self.theta, self.form
         if theta[HURST] < LOWEST:  # no density is finite, as where the spacings differ by orders
             return None
-        filling, is_complete = self.filling, self.filling is None
-        modes = lattice.power(self.filled)
+        filling, modes = self.filling, lattice.power(self.filled)
         correction: Array | float = 1.0
         information: Array | float = 1.0
         pilot, is_settled = expected_power(lattice, theta, form), False
@@ -115,7 +114,7 @@ class FirstFit:
             if filling is not None and not is_settled:
                 correction = filling_ratio(lattice, pilot, filling)
                 information = float(np.mean(filling.observed)) ** 2 * np.minimum(1.0, correction)
-            power = modes if is_complete else modes / correction
+            power = modes if filling is None else modes / correction
             keep &= power > EMPTY * pilot
             if not keep.any():
                 return None
@@ -128,9 +127,9 @@ class FirstFit:
             now = np.array([math.log(lattice.stretch), 0.0])
             uv, _, share = log_ratio(levels, now, levels.slope(unblurred), deviation=RATIO_DEVIATION)
             stretch = math.exp(share * uv[0])
-            if is_complete and lattice.stretch == stretch == 1.0:
+            if filling is None and lattice.stretch == stretch == 1.0:
                 break
-            if not is_complete and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
+            if filling is not None and np.count_nonzero(keep) >= LEAST * LEAST_BINS:
                 bins = make_bins(lattice, power / level, pilot, keep, information=information, is_pilot=True)
                 hypothesis, _, theta = posterior(bins, Known(self.spread), is_pilot=True).most_probable
                 form = hypothesis.form
