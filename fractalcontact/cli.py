@@ -56,8 +56,8 @@ HELP = {  # of options, where it is long
     "units": "unit of the heights (z), and of the coordinates of points: m, mm, um ... (default: that of "
     "the file, else m)",
     "spacing": "distance between the points, or of the cells, m, or with its unit: 3e-4, 0.3mm",
-    "channel": "channel of an instrument's file, array of .npz, .mat or .h5, variable of NetCDF, by its name "
-    "or its number from 0",
+    "channel": "channel of an instrument's file, band of a raster or array of .npz, .mat or .h5, by its name "
+    "or its number from 0; name of a variable of NetCDF",
     "benchmarks": "surfaces, dimensions, contact, domains, joints: error against run time of their methods "
     "(default: all); or estimators: bias, error over the Cramer-Rao bound and coverage of the estimators "
     "of roughness",
@@ -195,6 +195,7 @@ def _metre(text: str) -> float:
 
 
 def _channel(text: str) -> str | int:
+    """Return the number or the name of a channel."""
     return int(text) if text.isdecimal() else text
 
 
