@@ -318,9 +318,9 @@ class Filling:
     """Fill gaps with the mean of their surroundings, of the pyramid of 2 x 2 means.
 
     From coarse to fine a missing mean is interpolated from the next coarser ones, then moved to the mean of
-    its four neighbours some times. The fill has no steps, whose power would be that of short waves. It differs
-    from the harmonic fill by 7 % (rms) in a hole of 50 x 50 points, and by .02 % at single points. Gaps of a
-    profile are filled by straight lines.
+    its four neighbours some times. The fill has no steps, whose power would be that of short waves. It
+    differs from the harmonic fill by 7 % (rms) in a hole of 50 x 50 points, and by .02 % at single points.
+    Gaps of a profile are filled by straight lines.
 
     Parameters
     ----------
