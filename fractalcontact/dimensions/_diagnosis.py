@@ -88,9 +88,8 @@ def unevenness(heights: Array, blocks: int = 8, parts: int = 4) -> float:
     the scatter within a block has 15 degrees of freedom. Where roughness is even, the variance of the mean
     square second difference of blocks is a sixteenth of that of the parts.
     """
-    shape = (
-        (1, heights.shape[1] - 2) if heights.shape[0] == 1 else (heights.shape[0] - 1, heights.shape[1] - 1)
-    )
+    ny, nx = heights.shape
+    shape = (1, nx - 2) if ny == 1 else (ny - 1, nx - 1)
     edges = [max(1, n // (blocks * parts)) for n in shape]
     counts = [n // edge // parts * parts for n, edge in zip(shape, edges, strict=True)]
     if min(count for count, n in zip(counts, shape, strict=True) if n > 1) < 2 * parts:

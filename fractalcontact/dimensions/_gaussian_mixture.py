@@ -42,6 +42,7 @@ _SPREAD_STEPS = 0.25, 0.1
 # numbers doubled the time of transforms
 FADED = -100.0
 FIRST_SPREAD = 0.3  # spacings; the spreads of a table are even in asinh(s / FIRST_SPREAD)
+_NODES = 4  # Gaussians an octave of what free ends add to profiles: power off by 4e-5, the first mode by .003
 
 
 def mixture(longest: float) -> Array:
@@ -165,13 +166,13 @@ class AxisModes:
         return aliased, weights * (self.sampled if spread > 0.0 else aliased), unaliased
 
 
-def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
+def free_power(n: int, t: Array, detrended: bool) -> Array:
     """Return the expected squared cosine modes 1 ... n - 1 of n points with free ends, shape (t, n - 1).
 
     `detrended`: of the heights less their straight line.
     """
-    u, wider = np.arange(n + 1), 1.0 + 4.0 * t * spread**2
-    c = np.exp(np.maximum(np.outer(t / -wider, np.square(u)), FADED))
+    u = np.arange(n + 1)
+    c = np.exp(np.maximum(np.outer(-t, np.square(u)), FADED))
     # the sums of (n - u) c cos and of n c sin are the even and the odd part of one transform of 2 n points
     both = np.concatenate([c * (2.0 * n - u), c[:, n - 1 : 0 : -1] * -u[n - 1 : 0 : -1]], axis=1)
     both[:, 0], both[:, n] = n, 0.0
@@ -181,10 +182,10 @@ def free_power(n: int, t: Array, spread: float, detrended: bool) -> Array:
         v = np.arange(n) - 0.5 * (n - 1)
         v /= np.sqrt(v @ v)
         g = fft.dct(v[None], 2, (1,))[0, 1:] / math.sqrt(2.0 * n)
-        both = np.concatenate([c[:, :n], c[:, n - 1 : 0 : -1]], axis=1)
-        cv = fft.irfft(fft.rfft(both) * fft.rfft(np.pad(v, (0, n - 1))), 2 * n - 1)[:, :n]
+        both = np.concatenate([c, c[:, n - 1 : 0 : -1]], axis=1)
+        cv = fft.irfft(fft.rfft(both) * fft.rfft(np.pad(v, (0, n))), 2 * n)[:, :n]
         power += -2.0 * g * fft.dct(cv, 2, (1,))[:, 1:] / math.sqrt(2.0 * n) + g * g * (cv @ v)[:, None]
-    return np.asarray(np.maximum(power, 1e-14 * c.sum(axis=1, keepdims=True)) / np.sqrt(wider)[:, None])
+    return np.asarray(np.maximum(power, 1e-14 * c.sum(axis=1, keepdims=True)))
 
 
 @dataclass(frozen=True)
@@ -358,12 +359,15 @@ class Lattice:
         Fourier modes of a periodic surface in place of cosine modes.
     stretch : float
         Lag along x over that along y of equal increments, without a blur.
+    columns : ndarray of int, optional
+        Modes of a profile that are used. Default: all.
     """
 
     shape: tuple[int, int]
     spacing: tuple[float, float]
     periodic: bool = False
     stretch: float = 1.0
+    columns: Array | None = None
 
     @property
     def axes(self) -> int:
@@ -377,10 +381,11 @@ class Lattice:
     @cached_property
     def orders(self) -> list[Array]:
         """Half waves along y and x of the modes that are used: those that vary along both axes."""
-        if not self.periodic:
-            return [np.zeros(1) if n == 1 else np.arange(1.0, n) for n in self.shape]
-        ny, (rows, columns) = self.shape[0], self._waves
-        return [2.0 * np.where(rows > ny // 2, rows - ny, rows), 2.0 * columns]
+        y, x = (np.zeros(1) if n == 1 else np.arange(1.0, n) for n in self.shape)
+        if self.periodic:
+            ny, (rows, columns) = self.shape[0], self._waves
+            y, x = 2.0 * np.where(rows > ny // 2, rows - ny, rows), 2.0 * columns
+        return [y, x if self.columns is None else x[self.columns]]
 
     @property
     def _waves(self) -> tuple[Array, Array]:
@@ -405,11 +410,6 @@ class Lattice:
         return max(n * d for n, d in zip(self.shape, self.spacing, strict=True))
 
     @property
-    def shortest_edge(self) -> float:
-        """Length of the shorter edge, in x spacings."""
-        return min(n * d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1)
-
-    @property
     def steps(self) -> tuple[float, float]:
         """Spacings along y and x over which increments count."""
         return self.spacing[0] * self.stretch, self.spacing[1]
@@ -423,6 +423,11 @@ class Lattice:
     def t(self) -> Array:
         """Scales of the Gaussians: from one of eight extents on."""
         return mixture(max(n * d for n, d in zip(self.shape, self.steps, strict=True)))
+
+    def spread_nodes(self, *, is_pilot: bool) -> tuple[Array, Array]:
+        """Return the spreads of a table, see the function of this name."""
+        edges = [n * d for n, d in zip(self.shape, self.spacing, strict=True) if n > 1]
+        return spread_nodes(min(edges), is_pilot=is_pilot)
 
     def transforms(self, spread: float, *, edges: bool) -> list[list[Array]]:
         """Return for each form the transforms (t, modes) of each Gaussian along y and x.
@@ -449,10 +454,28 @@ class Lattice:
         aliased, *others = line.densities(s)
         if not edges:
             return [aliased, *others]
-        power = free_power(n, line.t, s, self.axes == 1)
+        wider = 1.0 + 4.0 * line.t * s**2
+        if self.columns is None:
+            power = free_power(n, line.t / wider, self.axes == 1) / np.sqrt(wider)[:, None]
+        else:
+            first, share, _ = _cubic(_NODES * (np.log2(self.t / self.t[0] / wider) + 1.0), len(self._leaks))
+            leaks = self._leaks[first[:, None] + np.arange(4)]
+            leak = np.einsum("tk,tkq->tq", share / np.sqrt(wider)[:, None], leaks)
+            power = np.maximum(aliased + leak, 0.0)
         # the edges feel long waves alone, which are alike in all forms
         leak, least = power - aliased, 1e-14 * power
         return [power, *(np.maximum(leak + clean, least) for clean in others)]
+
+    @cached_property
+    def _leaks(self) -> Array:
+        """What free ends add to the densities along x of some Gaussians an octave: of these, without a blur,
+        or of narrower ones with one.
+        """
+        t = self.t[0] * 2.0 ** np.arange(-1.0, np.log2(self.t[-1] / self.t[0]) + 1.0, 1.0 / _NODES)
+        n, q = self.shape[1], self.wavenumbers[1]
+        # each by itself: less memory
+        leaks = [free_power(n, s, True)[0, self.columns] - AxisModes(s, q).sampled[0] for s in t[:, None]]
+        return np.array(leaks)
 
     def power(self, heights: Array) -> Array:
         """Return the squared modes of complete heights."""

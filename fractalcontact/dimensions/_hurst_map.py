@@ -441,9 +441,8 @@ def _fitted(
 ) -> tuple[Array, Array, Array, Array]:
     """Fit level and column to each row: coefficients, variance of the second one, chi square of the rest."""
     level = np.broadcast_to(level, column.shape)
-    aa, ab, bb = (
-        (weight * p * q).sum(axis=1) for p, q in ((level, level), (level, column), (column, column))
-    )
+    pairs = (level, level), (level, column), (column, column)
+    aa, ab, bb = ((weight * p * q).sum(axis=1) for p, q in pairs)
     a, b = ((weight * p * values).sum(axis=1) for p in (level, column))
     determinant = np.maximum(aa * bb - ab * ab, 1e-300)
     first, second = (bb * a - ab * b) / determinant, (aa * b - ab * a) / determinant

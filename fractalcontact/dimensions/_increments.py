@@ -315,9 +315,8 @@ def gapped_pairs(observed: Array, order: int, axes: int, stride: int) -> PairCou
             for _ in range(order):
                 n = is_complete.shape[axis]
                 reach = min(lag * stride, n)
-                is_complete = is_complete.take(range(reach, n), axis) & is_complete.take(
-                    range(n - reach), axis
-                )
+                is_near = is_complete.take(range(n - reach), axis)
+                is_complete = is_near & is_complete.take(range(reach, n), axis)
             mask = np.zeros(torus)
             mask[: is_complete.shape[0], : is_complete.shape[1]] = is_complete
             spectra.append(fft.rfft2(mask))

@@ -15,22 +15,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fractalcontact.base import fft
 from fractalcontact.base.jit import kernel
 from fractalcontact.base.numbers import Array
-from fractalcontact.dimensions._gaussian_mixture import (
-    FORMS,
-    Bins,
-    Lattice,
-    alias_logs,
-    log_bend,
-    spread_nodes,
-    weights,
-)
+from fractalcontact.dimensions._gaussian_mixture import FORMS, Bins, Lattice, alias_logs, log_bend, weights
 
 PER_OCTAVE = 3  # bins: within one, the information on H that is lost is 2 %
 LEAST = 8  # modes in a bin: the logarithm of their mean is then nearly normal
@@ -269,7 +261,10 @@ def make_bins(
     y, x = lattice.wavenumbers
     aliases = alias_logs(y[rows], x[columns], lattice.spacing[0], lattice.axes)
     ends = np.cumsum(np.bincount(bins))
-    spreads, nodes = spread_nodes(lattice.shortest_edge, is_pilot=is_pilot)
+    if lattice.axes == 1:
+        some, columns = np.unique(columns, return_inverse=True)
+        lattice = replace(lattice, columns=some)
+    spreads, nodes = lattice.spread_nodes(is_pilot=is_pilot)
     tables = np.zeros((FORMS, spreads.size, count.size, lattice.t.size))
     for k, spread in enumerate(spreads):
         transforms = lattice.transforms(float(spread), edges=True)

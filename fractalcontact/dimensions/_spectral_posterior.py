@@ -338,9 +338,8 @@ def posterior(
     ranges = (LOWEST, HIGHEST), _PRIOR_SPREAD, _PRIOR_NOISE, corners, _LONG_HURSTS, _PRIOR_SHARPNESS
     prior = np.array(ranges).T
     whitening, constants = map(np.stack, zip(*(_whitening(kind, bins) for kind in kinds), strict=True))
-    fit = _Fit(
-        bins, prior, np.array([each.form for each in chosen]), np.array([each.theta for each in chosen])
-    )
+    forms, thetas = (np.array(each) for each in zip(*((h.form, h.theta) for h in chosen), strict=True))
+    fit = _Fit(bins, prior, forms, thetas)
     # the first kind of discrepancy has several maxima, each other kind the one near its best start, or near
     # the best of the first kind
     first = attempts[is_pilot]

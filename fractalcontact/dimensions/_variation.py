@@ -140,9 +140,7 @@ def _mean_ranges(heights: Array, edges: Array, squares: bool, geometric: bool) -
         total = 0.0
         for size_y, size_x in shapes:
             spread = running_range(heights, size_y, size_x)
-            spread = (
-                spread[np.isfinite(spread) & (spread > 0.0)] if geometric else spread[np.isfinite(spread)]
-            )
+            spread = spread[np.isfinite(spread) & (spread > 0.0 if geometric else True)]
             total += float(np.sum(np.log(spread) if geometric else spread))
             numbers[k] += spread.size
         if numbers[k]:

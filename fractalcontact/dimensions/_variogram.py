@@ -282,9 +282,8 @@ def _axis_lags(shape: tuple[int, int], largest: tuple[int, int]) -> Array:
     """Return lag vectors along y and x, about five per octave, up to `largest` steps."""
     vectors = []
     for axis in (0, 1):
-        steps = np.unique(
-            np.rint(2.0 ** np.arange(0.0, np.log2(max(largest[axis], 1)) + 1e-9, 0.2)).astype(int)
-        )
+        octaves = np.arange(0.0, np.log2(max(largest[axis], 1)) + 1e-9, 0.2)
+        steps = np.unique(np.rint(2.0**octaves).astype(int))
         steps = steps[steps < shape[axis]]
         vectors.append(np.stack([steps, 0 * steps], axis=1)[:, :: 1 if axis == 0 else -1])
     return np.concatenate(vectors)

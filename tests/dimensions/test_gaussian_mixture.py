@@ -1,5 +1,7 @@
 """Expected power of cosine modes, beside dense covariance matrices and simulation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.fft import dctn
@@ -50,6 +52,21 @@ def test_power_of_detrended_profile_is_that_of_dense_covariance(hurst):
     expected = np.diag(basis @ project @ covariance @ project @ basis.T)[1:]
     total = expected_power(Lattice((1, n), (1.0, 1.0)), theta(hurst), ALIASED)
     np.testing.assert_allclose(total[0], expected, rtol=2e-4)
+
+
+@pytest.mark.parametrize("form", [ALIASED, FILTERED])
+@pytest.mark.parametrize("hurst", [0.05, 0.5, 0.95])
+def test_power_of_some_modes_of_profile_is_that_of_all_modes(hurst, form):
+    columns = np.unique(np.geomspace(1, 255, 40).astype(int) - 1)
+    profile = Lattice((1, 256), (1.0, 1.0))
+    some = replace(profile, columns=columns)
+    for spread in (0.0, 0.5, 4.0):
+        expected = expected_power(profile, theta(hurst, spread), form)[:, columns]
+        clean = expected_power(profile, theta(hurst, spread), form, edges=False)[:, columns]
+        power = expected_power(some, theta(hurst, spread), form)
+        counts = (clean > 0.5 * expected) & (clean > 1e-4 * clean.max())
+        assert counts.sum() > 5
+        np.testing.assert_allclose(power[counts], expected[counts], rtol=2e-4)
 
 
 @pytest.mark.parametrize("spread", [0.5, 1.0])
