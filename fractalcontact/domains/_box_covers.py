@@ -89,9 +89,10 @@ def _fewest_boxes(
     folded = 1 << 13  # positions of boxes that are kept apart: with fewer, loops are too short
     fold = size * max(1, -(-min(positions, folded) // size))  # of a whole number of boxes
     met, lost = np.zeros((2, offsets, fold), np.int32)
-    count_boxes_in_bands(
-        cells, size, row_bands, column_bands[~is_full], positions, beyond, met, lost, count, area
-    )
+    nx = cells.shape[1]
+    work = np.zeros((2, 2), np.int64), np.zeros((3, nx), np.int32), np.zeros((2, nx + 1 + beyond), np.int32)
+    cut = column_bands[~is_full]
+    count_boxes_in_bands(cells, size, row_bands, cut, positions, *work, met, lost, count, area)
     fewest, least = [], []
     # sums that are added up at a time: those of a large plane take gigabytes
     step = max(1, (1 << 22) // fold)
@@ -151,7 +152,9 @@ def _positions_that_meet(cells: Array, largest: int, periodic: Sequence[bool]) -
     ahead = [(0, largest if wraps and n > 1 else 0) for n, wraps in zip(cells.shape, periodic, strict=True)]
     continued = np.pad(cells, ahead, mode="wrap") if np.any(ahead) else cells
     # with the boxes that hang over the far edges
-    every = np.cumsum(nearest_ahead(continued, ny, nx, largest))[:-1]
+    distance, histogram = np.full(continued.shape[1] + 1, largest + 1, np.int32), np.zeros(largest + 2, int)
+    nearest_ahead(continued, ny, nx, distance, histogram)
+    every = np.cumsum(histogram)[:-1]
     folded = every.copy()
     free = {axis: _from_edges(cells, axis, largest) for axis in (0, 1) if not periodic[axis]}
     for axis, (low, high) in free.items():
@@ -226,7 +229,9 @@ def count_boxes_in_bands(
     rows: Array,
     cut: Array,
     positions: int,
-    beyond: int,
+    summed_rows: Array,
+    columns: Array,
+    prefix: Array,
     met: Array,
     lost: Array,
     count: Array,
@@ -239,15 +244,14 @@ def count_boxes_in_bands(
     columns, one at each of `positions`, by their position modulo that multiple, the boxes met, and the rows
     that those of them lose that count by their part inside; `count` and `area`
     (size, size) the boxes cut in x and their area in cells. All sums are integers, so that no result depends
-    on their order. A periodic x is continued by `beyond` columns.
+    on their order.
+
+    Zeros to work in, of the band and, where it is cut in y, of it with its neighbours: `summed_rows` (2, 2),
+    the range of rows that are summed, `columns` (3, nx), their cells of the set in each column (and, last,
+    none), and `prefix` (2, nx + 1), how many columns left of each position hold any, or hold more than in the
+    band; a periodic x is continued. `numpy.zeros` in a kernel takes .3 s to compile.
     """
     ny, nx = mask.shape
-    # of the band and, where it is cut in y, of it with its neighbours: the range of rows that are summed,
-    # their cells of the set in each column (and, last, none), and how many columns left of each position
-    # hold any, or hold more than in the band
-    summed_rows = np.zeros((2, 2), np.int64)
-    columns = np.zeros((3, nx), np.int32)
-    prefix = np.zeros((2, nx + 1 + beyond), np.int32)
     ahead = np.uint32(size)  # unsigned: no test for negative indices
     for k in range(rows.shape[0]):
         first, end, offset = rows[k, 0], rows[k, 1], rows[k, 4]
@@ -291,16 +295,16 @@ def count_boxes_in_bands(
 
 
 @kernel
-def nearest_ahead(cells: Array, rows: int, columns: int, largest: int) -> Array:
+def nearest_ahead(cells: Array, rows: int, columns: int, distance: Array, histogram: Array) -> None:
     """Count the positions in the first `rows` and `columns` by the size from which on a box meets the set.
 
     A box at (i, j) of size s meets the set if s >= d(i, j), where d is one on the set and elsewhere one more
     than the smallest d of the three neighbours ahead: a one-sided chessboard distance. Beyond an edge the set
-    is empty; a periodic axis is continued for the `largest` box. Of the counts, (largest + 2), the last is
-    of positions where no box does.
+    is empty; a periodic axis is continued for the largest box. Of the counts, `histogram` (largest + 2),
+    which are zero before, the last is of positions where no box does. `distance` (nx + 1) is larger than that
+    box.
     """
     nx = cells.shape[1]
-    distance, histogram = np.full(nx + 1, largest + 1, np.int32), np.zeros(largest + 2, np.int64)
     far = distance[nx]
     for i in range(cells.shape[0] - 1, -1, -1):
         beyond, corner = far, far  # values at j + 1, in this row and in the row below
@@ -314,4 +318,3 @@ def nearest_ahead(cells: Array, rows: int, columns: int, largest: int) -> Array:
         if i < rows:
             for j in range(columns):
                 histogram[distance[j] if distance[j] < far else far] += 1
-    return histogram
