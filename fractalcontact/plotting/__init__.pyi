@@ -13,14 +13,14 @@ from ._islands import islands as islands
 from ._size_curves import box_dimension as box_dimension
 from ._size_curves import lacunarity as lacunarity
 from ._size_curves import signature as signature
-from ._strength import correlation as correlation
+from ._strength import decorrelation_length as decorrelation_length
 from ._strength import dilatancy as dilatancy
 from ._strength import friction as friction
 from ._strength import strength_envelope as strength_envelope
 
 __all__ = [
     "box_dimension",
-    "correlation",
+    "decorrelation_length",
     "curves",
     "dimensions",
     "directional_roughness",

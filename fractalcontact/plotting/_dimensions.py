@@ -163,7 +163,7 @@ def _draw_fit(above: LinePanel, below: LinePanel, fit: xr.Dataset, names: tuple[
 
 @figure
 def dimensions(
-    estimates: Any,
+    result: Any,
     *,
     truth: float | None = None,
     band: tuple[float, float] | None = None,
@@ -177,7 +177,7 @@ def dimensions(
 
     Parameters
     ----------
-    estimates : Dataset or node of a DataTree
+    result : Dataset or node of a DataTree
         From `fractalcontact.dimensions.estimate`: hurst, fractal_dimension, ci_low, ci_high (of the Hurst
         exponent) over `method`.
     truth : float, optional
@@ -198,7 +198,7 @@ def dimensions(
     ['default', 'variogram'] | fractal dimension $D$
     """
     names, dims = ("method", "hurst", "fractal_dimension"), ("method",)
-    data = result_of(estimates, names, dims, argument="estimates")
+    data = result_of(result, names, dims)
     methods = words(data["method"])
     value, hurst = quantity(data, "fractal_dimension", dims), table(data, "hurst", dims)
     rows = np.arange(len(methods))[::-1]

@@ -75,7 +75,7 @@ KINDS: dict[str, tuple[Drawing, tuple[str, ...]]] = {
     "friction": (_strength.friction, ("friction_angle",)),
     "area_by_resolution": (_contact_curves.area_by_resolution, ("area_dimension",)),
     "delta_dimension": (_strength.delta_dimension, ("covering_dimension",)),
-    "correlation": (_strength.correlation, ("decorrelation_length",)),
+    "decorrelation_length": (_strength.decorrelation_length, ("decorrelation_length",)),
     "directional_roughness": (_dimensions.directional_roughness, ("roughness_metric",)),
     "uplift": (_closure.uplift, ("uplift_profile",)),
     "hydraulic_aperture": (_closure.hydraulic_aperture, ("hydraulic_aperture",)),

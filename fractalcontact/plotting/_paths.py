@@ -216,11 +216,9 @@ def loaded_steps(path: xr.Dataset, most: int) -> list[int]:
 NAMES = {"E": "East", "N": "North", "W": "West", "S": "South"}
 
 
-def select_direction(
-    data: Any, direction: str | float | None, units: Units | None = None, argument: str = "result"
-) -> xr.Dataset:
+def select_direction(data: Any, direction: str | float | None, units: Units | None = None) -> xr.Dataset:
     """Return the part of a result that belongs to a direction, a word or an azimuth (None: everything)."""
-    dataset = shown_in(as_dataset(data, argument), units)
+    dataset = shown_in(as_dataset(data), units)
     if direction is None or "direction" not in dataset.coords:
         return dataset
     names = words(dataset["direction"])

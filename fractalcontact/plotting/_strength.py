@@ -230,7 +230,7 @@ def self_weight(result: Any, *, units: Units | None = None, ax: Axes | None = No
 
 @figure
 def dilatancy(
-    dilatancy: Any,
+    result: Any,
     *,
     direction: str | float | None = None,
     reach: float | None = None,
@@ -246,7 +246,7 @@ def dilatancy(
 
     Parameters
     ----------
-    dilatancy : Dataset or node of a DataTree
+    result : Dataset or node of a DataTree
         From `fractalcontact.joints.dilatancy`: rigid_dilatancy (m) over (direction, shear), optionally
         mean_slope over direction; with forces dilatancy (m) over (direction, shear, step).
     direction : str or float, optional
@@ -265,7 +265,7 @@ def dilatancy(
     >>> print(ax.get_ylabel(), "|", len(ax.lines), "curves")
     dilatancy $\delta$ (µm) | 3 curves
     """
-    data = _paths.select_direction(dilatancy, direction, units, "dilatancy")
+    data = _paths.select_direction(result, direction, units)
     data = _paths.limit_shear(data, reach)
     if "dilatancy" in data:
         return _of_elastic_bodies(data, marked, ax)
@@ -274,7 +274,7 @@ def dilatancy(
 
 def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
     dims = ("direction", "shear")
-    data = result_of(data, ("rigid_dilatancy", "shear"), dims, argument="dilatancy")
+    data = result_of(data, ("rigid_dilatancy", "shear"), dims)
     panel = LinePanel(ax, data, "shear", "rigid_dilatancy", dims, _paths.by_direction(data))
     panel.curves("rigid dilatancy")
     if "mean_slope" in data:
@@ -287,7 +287,7 @@ def _of_rigid_surfaces(data: Any, ax: Axes | None) -> Axes:
 
 
 def _of_elastic_bodies(data: Any, marked: Sequence[float], ax: Axes | None) -> Axes:
-    data = result_of(data, ("dilatancy", "shear"), ("shear", "step"), argument="dilatancy")
+    data = result_of(data, ("dilatancy", "shear"), ("shear", "step"))
     loads, points, shear = _paths.by_load(data), _style.MAX_MARKED_POINTS, table(data, "shear", ("shear",))
     panel = LinePanel(ax, data, "shear", "dilatancy", ("step", "shear"), loads, points=points)
     panel.curves("dilatancy")
@@ -310,14 +310,14 @@ DIMENSIONS = ("covering_dimension", "variogram_dimension", "spectrum_dimension")
 
 
 @figure
-def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
+def decorrelation_length(result: Any, *, units: Units | None = None, ax: Axes | None = None) -> Axes:
     """Draw the correlation of the two faces of a joint against shear displacement.
 
     Vertical dotted lines show the decorrelation lengths, and bands their intervals.
 
     Parameters
     ----------
-    memory : Dataset or node of a DataTree
+    result : Dataset or node of a DataTree
         From `fractalcontact.joints.decorrelation_length`.
     {shared}
 
@@ -327,12 +327,12 @@ def correlation(memory: Any, *, units: Units | None = None, ax: Axes | None = No
     >>> lower = fc.surfaces.fbm((64, 64), 1e-4, hurst=0.8, rms_increment=1e-5, rng=1)
     >>> crack = fc.joints.Crack(lower, young=30e9, poisson=0.2, block=3.2e-3)
     >>> result = fc.joints.decorrelation_length(crack, direction="E")
-    >>> ax = fc.plotting.correlation(result)
+    >>> ax = fc.plotting.decorrelation_length(result)
     >>> print(ax.get_xlabel(), "|", ax.get_ylabel())
     shear displacement $v$ (mm) | correlation of the faces
     """
     names, dims = ("correlation", "shear", *LENGTHS), ("direction", "shear")
-    data = result_of(memory, names, dims, units, "memory")
+    data = result_of(result, names, dims, units)
     family, name = _paths.by_direction(data), "correlation of the faces"
     panel = LinePanel(ax, data, "shear", "correlation", dims, family, y_name=name, points=0)
     panel.curves("")
@@ -378,7 +378,7 @@ FIGURES = (
     StudyFigure("friction", "joints/friction", "friction_angle", _evenly_sampled(friction)),
     StudyFigure("delta_dimension", "joints/delta_dimension", "variogram_dimension", delta_dimension),
     StudyFigure("self_weight", "joints/self_weight", "structure_size", self_weight),
-    StudyFigure("correlation", "joints/decorrelation_length", "correlation", correlation),
+    StudyFigure("decorrelation_length", "joints/decorrelation_length", "correlation", decorrelation_length),
     StudyFigure(
         "strength_envelope",
         "joints/strength_envelope",

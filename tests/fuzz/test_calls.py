@@ -111,8 +111,8 @@ KEPT = {
     "a word as units of figures": ("plotting.draw", "units", lambda: "no", "units"),
     "an object that is no array as axes": ("plotting.curves", "axes", VALUES["class without array"], "axes"),
     "a list as axes": ("plotting.plot contact_area", "ax", list, "ax"),
-    "another unit in a figure": ("plotting.dilatancy", "dilatancy", lambda: slid().assign(
-        shear=slid()["shear"].assign_attrs(units="mm")), "dilatancy.shear.units"),
+    "another unit in a figure": ("plotting.dilatancy", "result", lambda: slid().assign(
+        shear=slid()["shear"].assign_attrs(units="mm")), "result.shear.units"),
     "descending in a figure": ("plotting.surface", "surface", lambda: rough()[:, ::-1], "surface.x"),
     "no steps in a figure": ("plotting.plot closure", "result", lambda: closed().isel(step=slice(0)),
                              "result.step"),

@@ -33,7 +33,7 @@ def delta_dimensions():
 
 def test_correlation_and_length():
     result = decorrelation()
-    ax = plotting.correlation(result)
+    ax = plotting.decorrelation_length(result)
     curves = [line for line in ax.lines if len(line.get_xdata()) == 3]
     for line, values in zip(curves, result["correlation"].values, strict=True):
         assert np.array_equal(line.get_ydata(), values)
@@ -68,7 +68,7 @@ def test_labels_of_shears_stay_apart():
 
 def test_nan_and_single_shear():
     for result, draw in (
-        (decorrelation(), plotting.correlation),
+        (decorrelation(), plotting.decorrelation_length),
         (delta_dimensions(), partial(plotting.plot, kind="delta_dimension")),
     ):
         missing = result.assign({name: v * np.nan for name, v in result.data_vars.items()})
@@ -78,6 +78,6 @@ def test_nan_and_single_shear():
 
 def test_wrong_result_is_refused():
     with pytest.raises(ValueError, match="correlation"):
-        plotting.correlation(delta_dimensions())
+        plotting.decorrelation_length(delta_dimensions())
     with pytest.raises(ValueError, match="covering_dimension"):
         plotting.plot(decorrelation(), "delta_dimension")
