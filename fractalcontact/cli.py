@@ -30,7 +30,7 @@ FAILED, WRONG_INPUT, STOPPED = 1, 2, 128  # and the number of the signal: as of 
 READING = ("spacing", "units", "channel")  # of `surfaces.read`
 TEMPLATE_ARGUMENTS = (  # of `scenes.template`; options of these names give them
     *READING, "level", "despike", "young", "poisson", "register", "turn_upper",
-    "friction_angle", "wall_strength",
+    "basic_friction_angle", "wall_strength",
 )  # fmt: skip
 ESTIMATOR_OPTIONS = ("hurst", "sizes", "families", "methods", "members", "seed")  # of `accuracy estimators`
 HELP = {  # of options, where it is long
@@ -48,6 +48,7 @@ HELP = {  # of options, where it is long
     "all lower faces, then all upper ones in the same order, or a pattern for each in quotes",
     "surfaces": "files of the surfaces, or a pattern in quotes: every format of fractalcontact.surfaces.read",
     "turn": "the upper body was scanned with its face up: turn it over about this axis",
+    "angle": "basic friction angle, degree",
     "jcs": "compressive strength of the joint walls, Pa or with its unit; with --friction-angle: shear "
     "strength, and a datasheet",
     "level": "remove the mean plane (1, the default unless the surface is periodic) or quadric (2); 0 "
@@ -213,7 +214,7 @@ def _add_question_options(command: argparse.ArgumentParser, question: str) -> No
         add("scans", nargs="+", metavar="LOWER UPPER", help=HELP["faces"])
         add("--as-scanned", dest="register", action="store_false", help=HELP["mated"])
         add("--turn-upper", choices=("x", "y"), help=HELP["turn"])
-        add("--friction-angle", type=float, help="basic friction angle, degree")
+        add("--friction-angle", dest="basic_friction_angle", type=float, metavar="ANGLE", help=HELP["angle"])
         add("--jcs", dest="wall_strength", type=_pascal, metavar="JCS", help=HELP["jcs"])
     else:
         add("scans", nargs="+", metavar="SCAN", help=HELP["surfaces"])

@@ -42,7 +42,7 @@ def template(
     despike: bool = False,
     register: bool = True,
     turn_upper: str | None = None,
-    friction_angle: float | None = None,
+    basic_friction_angle: float | None = None,
     wall_strength: float | None = None,
     surface: xr.DataArray | None = None,
     **reading: Any,
@@ -71,9 +71,10 @@ def template(
         Of a joint: move the upper face into mated position. False: leave the faces as they were scanned.
     turn_upper : {"x", "y"}, optional
         Of a joint: turn an upper body that was scanned face up over about this axis.
-    friction_angle, wall_strength : float, optional
-        Of a joint: basic friction angle (degree) and compressive strength of its walls, JCS (Pa). With both
-        the scene computes the strength, by the criteria and by a shear test with wear, and the datasheet.
+    basic_friction_angle, wall_strength : float, optional
+        Of a joint: friction angle of smooth faces (degree) and compressive strength of its walls, JCS (Pa).
+        With both the scene computes the strength, by the criteria and by a shear test with wear, and the
+        datasheet.
     surface : DataArray, optional
         The heights of `scan`, where they have been read already.
     **reading
@@ -124,9 +125,9 @@ def template(
         if is_joint:
             problems.require(level is None, "level", "a single face, not those of a joint", level)
             problems.choice("turn_upper", turn_upper, ("x", "y"), optional=True)
-            problems.number("friction_angle", friction_angle, at_least=0, below=90, optional=True)
+            problems.number("basic_friction_angle", basic_friction_angle, at_least=0, below=90, optional=True)
             problems.number("wall_strength", wall_strength, above=0, optional=True)
-            needed = friction_angle is not None or wall_strength is None
+            needed = basic_friction_angle is not None or wall_strength is None
             expected = "a friction angle (--friction-angle) beside the strength of the walls (--jcs)"
             problems.require(needed, "wall_strength", expected, wall_strength)
         if is_pressed:
@@ -154,7 +155,7 @@ def template(
         faces["upper"] = _file_table(upper or "", folder, options)
         names.append(_words(upper or ""))
         # true pressures beyond the strength of the walls are named
-        material |= {"basic_friction_angle": friction_angle, "yield_pressure": wall_strength}
+        material |= {"basic_friction_angle": basic_friction_angle, "yield_pressure": wall_strength}
         values = _travel(facts)
     else:
         values = _loads(_slope(surface, options), young, poisson) if is_pressed else _roughness(facts)

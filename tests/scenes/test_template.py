@@ -362,7 +362,7 @@ def test_share_of_missing_points_is_said(scans, capsys):
 
 def test_strength_of_a_joint_with_jcs(scans):
     text = fc.scenes.template(
-        "joint", "lower.nc", "upper.nc", young=3e10, friction_angle=30.0, wall_strength=150e6
+        "joint", "lower.nc", "upper.nc", young=3e10, basic_friction_angle=30.0, wall_strength=150e6
     )
     scene = tomllib.loads(text)
     assert scene["material"]["basic_friction_angle"] == 30.0
@@ -388,7 +388,7 @@ def test_soft_modulus_warns_once(scans, capsys):
 
 
 def test_key_in_the_wrong_table_is_reported_first(scans):
-    text = fc.scenes.template("joint", "lower.nc", "upper.nc", young=3e10, friction_angle=30.0)
+    text = fc.scenes.template("joint", "lower.nc", "upper.nc", young=3e10, basic_friction_angle=30.0)
     text = text.replace("[material]", "[material]\nJCS = 150e6").replace("[want]", "[want]\ndatasheet = true")
     (scans / "joint.toml").write_text(text, encoding="utf-8")
     with pytest.raises(InvalidInput) as caught:
