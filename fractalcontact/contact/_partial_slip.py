@@ -62,7 +62,7 @@ def partial_slip(
     influence: str | None = None,
     disc_radius: str = "second_order",
     tolerance: float = DEFAULT_TOLERANCE,
-    keep: Sequence[str] = ("slip_state",),
+    keep: str | Sequence[str] = ("slip_state",),
     progress: bool = False,
 ) -> xr.Dataset:
     """Shear a pressed rough surface below the force of sliding: where it sticks and where it slips.
@@ -92,7 +92,7 @@ def partial_slip(
         None: "full" where the contact has a lay, so that `superposition_error` is above 3 %.
     boundary, influence, disc_radius, tolerance
         As for `press`.
-    keep : sequence out of "slip_state", "traction_x", "traction_y", "slip_x", "slip_y"
+    keep : any of "slip_state", "traction_x", "traction_y", "slip_x", "slip_y"
         Maps (step, y, x) to return: flags open, stick, slip; traction on the surface (Pa); slip since the
         start of the path (m), 0 where open.
     progress : bool

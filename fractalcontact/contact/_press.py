@@ -69,7 +69,7 @@ def press(
     hardness: float | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
     method: str = "fast",
-    keep: Sequence[str] = ("state",),
+    keep: str | Sequence[str] = ("state",),
     include: str | Sequence[str] = (),
     progress: bool = False,
 ) -> xr.Dataset:

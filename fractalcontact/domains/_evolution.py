@@ -57,7 +57,7 @@ def _check_signature(problems: Problems) -> None:
 def evolution(
     mask: xr.DataArray,
     *,
-    include: Sequence[str] = (),
+    include: str | Sequence[str] = (),
     along: str | None = None,
     window: Any = None,
     frame: str = "upper",
@@ -75,7 +75,7 @@ def evolution(
     ----------
     mask : DataArray, dims (..., y, x)
         Boolean, or integer flags where contact means value > 0.
-    include : sequence of str
+    include : str or sequence of str
         Further measures, out of "islands", "percolation", "box_dimension", "minkowski_dimension",
         "correlation_dimension", "boundary_dimension", "lacunarity".
     along, frame, connectivity, periodic, valid

@@ -53,8 +53,8 @@ def islands(
     connectivity: int = 1,
     periodic: bool | None = None,
     valid: xr.DataArray | None = None,
-    keep: Sequence[str] = ("label",),
-    include: Sequence[str] | None = None,
+    keep: str | Sequence[str] = ("label",),
+    include: str | Sequence[str] | None = None,
 ) -> xr.Dataset:
     """Islands of a set of cells: their number, their map, and a table of their sizes.
 
@@ -68,9 +68,9 @@ def islands(
         Whether islands continue across the edges; by default along periodic axes. True needs periodic axes.
     valid : DataArray of bool, dims (y, x), (x) or those of the mask, optional
         Observed cells; the others are in no island.
-    keep : sequence of str
+    keep : str or sequence of str
         Maps to keep: ("label",) or (). Without the map a plane is labelled band by band, in little memory.
-    include : sequence of str, optional
+    include : str or sequence of str, optional
         Columns of the table; () for no table. By default all but those of the shape; `cells` and
         `area` alone where a plane has more than 2^22 islands, as the table takes some 200 bytes for each.
 

@@ -53,7 +53,7 @@ def closure(
     normal_force: Path | None = None,
     nominal_pressure: Path | None = None,
     bulk: str = "flat_block",
-    keep: Sequence[str] = ("state",),
+    keep: str | Sequence[str] = ("state",),
     influence: str | None = None,
     disc_radius: str = "second_order",
     hardness: float | None = None,
@@ -81,7 +81,7 @@ def closure(
     bulk : {"flat_block", "uniform_pressure"}
         Bulk part w_b: closure of the flat block, or its mean displacement under uniform pressure (about 9 %
         more for a square). Zero for periodic bodies.
-    keep : sequence of str
+    keep : str or sequence of str
         Maps over (shear, step, y, x): "state", "pressure", "gap", "displacement", "residual_height".
     influence, disc_radius, hardness, tolerance, method
         As for `fractalcontact.contact.press`. With a `hardness` unloading is stiffer than loading.

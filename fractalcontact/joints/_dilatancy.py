@@ -54,7 +54,7 @@ def dilatancy(
     normal_stiffness: float | None = None,
     pressed: xr.Dataset | None = None,
     bulk: str = "flat_block",
-    keep: Sequence[str] = (),
+    keep: str | Sequence[str] = (),
     influence: str | None = None,
     disc_radius: str = "second_order",
     hardness: float | None = None,

@@ -117,7 +117,7 @@ def direct_shear(
     normal_stiffness: float | None = None,
     shear_stiffness: float | None = None,
     distance: float | None = None,
-    keep: Sequence[str] = (),
+    keep: str | Sequence[str] = (),
     influence: str | None = None,
     disc_radius: str = "second_order",
     tolerance: float = 1e-5,  # 1e-4 changed the stresses of two joints by 7e-7, 1e-7 by 6e-8

@@ -81,7 +81,7 @@ def partial_slip(
     influence: str | None = None,
     disc_radius: str = "second_order",
     tolerance: float = DEFAULT_TOLERANCE,
-    keep: Sequence[str] = (),
+    keep: str | Sequence[str] = (),
     progress: bool = False,
 ) -> xr.Dataset:
     """Push a pressed crack towards sliding: shear stiffness, hysteresis, and the part that still sticks.
@@ -105,7 +105,7 @@ def partial_slip(
         Local friction mu; None: the tangent of the basic friction angle of the crack.
     method, influence, disc_radius, tolerance
         As for `fractalcontact.contact.partial_slip`; None chooses the method at each shear.
-    keep : sequence of str
+    keep : str or sequence of str
         Maps over (shear, step, y, x): "slip_state", "traction_x", "traction_y", "slip_x", "slip_y".
     progress : bool
         Show a progress bar over the shears.

@@ -82,7 +82,7 @@ def transmissivity(
         Dynamic viscosity, Pa s; adds `flow_conductance`.
     periodic : bool, optional
         None: along the periodic axes of `gap`. False: both axes are free.
-    keep : {"pressure", "flux"} or both
+    keep : any of "pressure", "flux"
         Maps to return beside the means.
 
     Returns
