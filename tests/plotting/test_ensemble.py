@@ -8,7 +8,6 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import fractalcontact as fc
-from fractalcontact.plotting._ensemble import reduced_trees
 
 FORCES = np.array([1.0, 2.0, 4.0])
 FACTORS = np.array([0.01, 0.02, 0.03, 0.05, 0.09])
@@ -138,11 +137,13 @@ def test_band_from_no_load_on_draws_without_warning(drawn, recwarn):
     assert [str(warning.message) for warning in recwarn if "non-positive" in str(warning.message)] == []
 
 
-def test_ends_without_a_bound_give_no_warning():
-    ends = xr.Dataset({"greatest_closure_high": ("member", [1.0, 2.0, 3.0, np.inf, np.inf])})
-    _, low, high = (
-        float(tree["joints/closure_laws/greatest_closure_high"])
-        for tree in reduced_trees(xr.DataTree.from_dict({"joints/closure_laws": ends}))
-    )
-    assert low == pytest.approx(1.64)
-    assert not np.isfinite(high)
+def test_band_ends_where_it_has_no_bound_and_gives_no_warning(drawn, recwarn):
+    tree = areas(study(FACTORS))
+    for name in ("contact_fraction", "corrected_contact_fraction"):
+        tree[f"contact/{name}"].values[3:, -1] = np.inf
+    _, bands, _ = drawn(tree)["contact_area"]
+    low, high = np.quantile(FACTORS, [0.16, 0.84]) * 100 / 10
+    corners = max(bands, key=lambda band: band[:, 1].max())
+    np.testing.assert_allclose(corners[:2], np.column_stack([FORCES, low * FORCES])[:2])
+    np.testing.assert_allclose(corners[2:4], np.column_stack([FORCES, high * FORCES])[1::-1])
+    assert [str(warning.message) for warning in recwarn if "invalid value" in str(warning.message)] == []

@@ -14,7 +14,6 @@ from copies import Copy, copied_command
 
 import fractalcontact as fc
 from fractalcontact.base.errors import FractalContactError, FractalContactWarning, InvalidInput
-from fractalcontact.scenes._result_tree import pooled, scan_facts
 
 SCENE = """title = "Scans"
 [surface]
@@ -212,21 +211,44 @@ def test_mean_has_the_interval_of_student_without_errors(study):
     np.testing.assert_allclose([mean, low, high], expected, rtol=1e-9)
 
 
-def test_interval_of_a_share_of_the_area_ends_at_all_of_it():
-    shares = xr.DataArray([0.2, 0.9, 0.95], dims="scan", attrs={"units": "1", "long_name": "contact area"})
-    means = pooled(xr.Dataset({"contact_fraction": shares}))
-    assert float(shares.mean() + 4.30265 * shares.std(ddof=1) / 3**0.5) > 1.0  # Student, 2 degrees of freedom
-    assert float(means["contact_fraction_high"]) == 1.0
+def mean_over(tmp_path, surfaces, name, scene):
+    """Return a column of the table of scans, its mean over them, and the ends of the interval of the mean."""
+    (tmp_path / "scans").mkdir()
+    for number, surface in enumerate(surfaces):
+        fc.save(surface, tmp_path / "scans" / f"{number}.nc")
+    (tmp_path / "scans.toml").write_text(f'surface.read = "scans/*.nc"\n{scene}', encoding="utf-8")
+    result = fc.scenes.run(tmp_path / "scans.toml", progress=False)
+    mean, low, high = (float(result[f"{name}{end}"]) for end in ("", "_low", "_high"))
+    return result["overview"].to_dataset(), mean, low, high
 
 
-def test_interval_of_the_dimension_of_white_noise_ends_at_three():
-    texts = {"units": "1", "long_name": "fractal dimension"}
-    columns = {"": [3.0, 3.0, 3.0], "_low": [2.99, 2.98, 2.98], "_high": [3.0, 3.0, 3.0]}
-    main = {f"fractal_dimension{end}": ("scan", each, texts) for end, each in columns.items()}
-    means = pooled(xr.Dataset(main | {"standard_error": ("scan", [0.015] * 3, {"units": "1"})}))
-    low, high = (float(means[f"fractal_dimension_{end}"]) for end in ("low", "high"))
-    assert low == pytest.approx(3.0 - 4.30265 * 0.015 / 3**0.5, abs=1e-5)  # Student, 2 degrees of freedom
+def test_interval_of_a_share_of_the_area_ends_at_none_and_at_all_of_it(tmp_path):
+    surfaces = [
+        fc.surfaces.spectral((32, 32), 1e-4, hurst=0.8, rms_slope=slope, rng=1)
+        for slope in (0.08, 0.012, 0.01)
+    ]
+    scene = '[contact]\ncontact_modulus = 1e9\nnominal_pressure = 1e7\n[want]\ncontact = ["press"]\n'
+    overview, mean, low, high = mean_over(tmp_path, surfaces, "contact_fraction", scene)
+    shares = overview["contact_fraction"].values
+    half = 4.30265 * shares.std(ddof=1) / 3**0.5  # Student, 2 degrees of freedom
+    assert mean == pytest.approx(shares.mean())
+    assert mean - half < 0.0
+    assert mean + half > 1.0
+    assert (low, high) == (0.0, 1.0)
+
+
+def test_interval_of_the_dimension_of_white_noise_ends_at_three(tmp_path):
+    surfaces = [
+        fc.surfaces.from_array(1e-6 * np.random.default_rng(seed).standard_normal((32, 32)), 1e-4)
+        for seed in range(3)
+    ]
+    scene = '[want]\ndimensions = ["increments"]\n'
+    overview, mean, low, high = mean_over(tmp_path, surfaces, "fractal_dimension", scene)
+    error = (overview["standard_error"] ** -2.0).sum().item() ** -0.5  # the scans differ by no more
+    half = 4.30265 * error  # Student, 2 degrees of freedom
+    assert mean + half > 3.0
     assert high == 3.0
+    assert low == pytest.approx(mean - half, abs=1e-5)
 
 
 def test_finished_scans_are_not_repeated_and_a_mended_one_is_studied(study):
@@ -373,15 +395,13 @@ def test_jrc_below_its_scale_is_in_words_and_in_no_mean(tmp_path):
     assert "below 0" in next(line for line in text.splitlines() if line.startswith("0.nc"))
 
 
-def test_jrc_below_its_scale_is_no_outlier_of_those_on_it():
-    values = [-40.0, 3.0, 3.1, 3.2, 2.9, 9.0]
-    columns = {"roughness_coefficient": values, "status": ["done"] * 6, "caveats": [""] * 6}
-    overview = xr.Dataset({name: ("scan", each) for name, each in columns.items()}, {"scan": list("abcdef")})
-    facts = list(scan_facts(xr.DataTree.from_dict({"overview": overview})))
-    assert facts[1:] == [
-        "JRC is below 0, beyond its scale, and left out of the mean: a",
-        "outliers: JRC of f",
-    ]
+def test_jrc_below_its_scale_is_no_outlier_of_those_on_it(study):
+    overview = study[2]["overview"].to_dataset().isel(scan=[0, 0, 0, 0, 0, 0])
+    jrc = xr.Variable("scan", [-40.0, 3.0, 3.1, 3.2, 2.9, 9.0], {"units": "1"})
+    overview = overview.assign(roughness_coefficient=jrc, scan=list("abcdef"))
+    lines = fc.scenes.summary(xr.DataTree.from_dict({"overview": overview})).splitlines()
+    assert "JRC is below 0, beyond its scale, and left out of the mean: a" in lines
+    assert "outliers: JRC of f" in lines
 
 
 def test_many_rows_are_cut_with_a_word(study):

@@ -10,9 +10,7 @@ from study import SOUND, command_here
 import fractalcontact as fc
 from fractalcontact.base.errors import ConvergenceWarning
 from fractalcontact.base.file_contents import file_contents
-from fractalcontact.base.units import quantity_text, scale_for
-from fractalcontact.scenes._result_tables import amount
-from fractalcontact.scenes._result_tree import main_results
+from fractalcontact.base.units import quantity_text
 
 ENSEMBLE = SOUND.replace("rng = 5", "rng = 5\nmembers = 4").replace(
     'joints = ["closure", "rigid_dilatancy"]',
@@ -202,19 +200,27 @@ def test_members_are_counted_whose_dimension_has_a_note_or_no_interval(ensemble)
     assert "D has no interval (2 of 4): too few. D has no interval (1 of 4): seams." in text
 
 
-@pytest.mark.parametrize(
-    ("values", "cell"), [([4.0, -40.0, 6.0], "5.0 ± 1.4 (2 of 3)"), ([-40.0, -1.0, -2.0], "below 0")]
-)
-def test_jrc_of_members_below_the_scale_is_not_in_the_mean(values, cell):
-    face = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
-    jrc = fc.joints.roughness_coefficient(face, direction=["E"]).expand_dims(member=3).copy(deep=True)
-    jrc["roughness_coefficient"].values[:, 0] = values
-    tree = xr.DataTree.from_dict({"/joints/roughness_coefficient": jrc})
-    (row,) = rows(tree, "joint roughness coefficient (JRC)")
-    assert row["JRC"] == cell
-    mean = main_results({"joints/roughness_coefficient": jrc})["roughness_coefficient"]
+@pytest.mark.parametrize(("increment", "below"), [(5.75e-5, [False, True, False]), (1e-5, [True] * 3)])
+def test_jrc_of_members_below_the_scale_is_not_in_the_mean(increment, below, tmp_path):
+    (tmp_path / "study.toml").write_text(
+        '[surface]\ngenerate = "fbm"\nshape = [32, 32]\nspacing = 5e-4\nhurst = 0.8\nrng = 2\nmembers = 3\n'
+        f'rms_increment = {increment}\n[joint.roughness_coefficient]\ndirection = "E"\n'
+        '[want]\njoints = ["roughness_coefficient"]\n',
+        encoding="utf-8",
+    )
+    tree = fc.scenes.run(tmp_path / "study.toml", progress=False)
+    jrc = tree["joints/roughness_coefficient/roughness_coefficient"].values.ravel()
+    assert (jrc < 0).tolist() == below
+    counted = jrc[jrc >= 0]
+    mean = tree["roughness_coefficient"]
     assert "mean over the members" in mean.attrs["long_name"]
-    assert float(mean) == 5.0 if "of 3" in cell else np.isnan(mean)
+    (row,) = rows(tree, "joint roughness coefficient (JRC)")
+    if counted.size:
+        assert row["JRC"] == f"{counted.mean():.1f} ± {counted.std(ddof=1):.1f} (2 of 3)"
+        assert float(mean) == pytest.approx(counted.mean())
+    else:
+        assert row["JRC"] == "below 0"
+        assert np.isnan(mean)
 
 
 @pytest.mark.parametrize("columns", [80, 160])
@@ -263,12 +269,14 @@ def test_units_follow_the_values():
 
 
 def test_deviations_have_two_digits_also_before_the_point():
-    heights = xr.DataArray(
-        [16e-9, 18.6e-9, 20.8e-9], dims="member", name="mean_island_area", attrs={"units": "m2"}
-    )
-    assert amount(heights, scale=scale_for("m2", 1e-9)) == "18500 ± 2400 µm²"
-    heights = heights.copy(data=[220e-6, 359e-6, 480e-6]).assign_attrs(units="m")
-    assert amount(heights, scale=scale_for("m", 3e-4)) == "350 ± 130 µm"
+    face = fc.surfaces.fbm((32, 32), 5e-4, hurst=0.8, rms_increment=8e-5, rng=2)
+    islands = fc.domains.islands(face > 0).expand_dims(member=3).copy(deep=True)
+    islands["mean_island_area"].values[:] = [16e-9, 18.6e-9, 20.8e-9]
+    islands["largest_island"].values[:] = [220e-12, 359e-12, 480e-12]
+    cells = rows(xr.DataTree.from_dict({"/domains/islands": islands}), "islands")
+    values = {row["quantity"]: row["value"] for row in cells}
+    assert values["mean area"] == "18500 ± 2400 µm²"
+    assert values["largest island"] == "350 ± 130 µm²"
 
 
 def test_pressure_of_a_spring_says_at_which_shear_it_is():
