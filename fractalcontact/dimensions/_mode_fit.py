@@ -282,8 +282,8 @@ def log_ratio(
     for _ in range(30):  # 2 to 10 are needed; of 64 x 64 points under a lay of 8 to 1 some do not end
         here = logs(uv)
         columns = np.stack([(logs(uv + move) - here) / 1e-4 for move in 1e-4 * np.eye(2)[:free]], axis=1)
-        information = (weight[:, None] * columns).T @ columns
-        variance[:free, :free] = np.linalg.pinv(information + prior * np.eye(free))
+        curvature = (weight[:, None] * columns).T @ columns
+        variance[:free, :free] = np.linalg.pinv(curvature + prior * np.eye(free))
         step = variance[:, :free] @ (columns.T @ (weight * (target - here)) - prior * uv[:free])
         uv = uv + step / max(1.0, math.hypot(*step))
         uv = uv / max(1.0, math.hypot(*uv) / LARGEST_LOG_RATIO)

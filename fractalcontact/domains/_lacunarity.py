@@ -279,7 +279,9 @@ def _box_sums(cells: Array, valid: Array | None, boxes: Array, periodic: Sequenc
         # masses are exact integers; their squares along a row too, unless the box is longer than 2^14 cells
         is_exact = cells.dtype == np.uint8 and (height * width) ** 2 * across <= LARGEST_INT64
         exact = np.int32 if is_exact and nx * height <= LARGEST_INT32 else np.float64
-        work = [np.zeros(n, dtype) for dtype in (exact, np.int32) for n in (nx, nx + width + 1)]
+        columns, prefix = np.zeros(nx, exact), np.zeros(nx + width + 1, exact)
+        seen, seen_prefix = np.zeros(nx, np.int32), np.zeros(nx + width + 1, np.int32)
+        work = columns, prefix, seen, seen_prefix
         glide(cells, observed, height, width, rows, across, *work, sums[box])
     return sums.swapaxes(0, 1)
 
