@@ -173,7 +173,7 @@ def uplift(result: Any, *, units: Units | None = None, axes: Panels | None = Non
     diagrams = words(data["diagram"])
     are_known = "linear" in diagrams and set(diagrams) <= set(LINES)
     require(are_known, "result.diagram", f"'linear', and others of {', '.join(LINES)}", diagrams)
-    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), width_ratios=(1.0, 1.1))
+    left, right = shown = _style.panel_row(axes, 2, _style.WIDE_ROW, width_ratios=(1.0, 1.1))
     _maps.draw_values(left, plane)
     left.set_title(_state(data))
     dim = "x" if "x" in profile.dims else "y"

@@ -229,7 +229,7 @@ def slip_loops(result: Any, *, units: Units | None = None, axes: Panels | None =
     force, displacement, stuck, contact = (quantity(data, name, PATH) for name in names)
     share = stuck.values / np.where(contact.values > 0, contact.values, np.nan)
     sticking = Quantity(share, PER_CENT, "part of the contact that sticks")
-    shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1))
+    shown = _style.panel_row(axes, 2)
     for ax, x, y in zip(shown, (displacement, force), (force, sticking), strict=True):
         panel = LinePanel(ax, data, x, y, PATH, _paths.by_shear(data), points=_style.MAX_MARKED_POINTS)
         panel.curves("loading path")

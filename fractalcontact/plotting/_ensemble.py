@@ -162,8 +162,8 @@ def scans(result: Any, *, units: Units | None = None, axes: Panels | None = None
     scan_names = [str(name) for name in data[SCAN].values]
     are_named = len(scan_names) <= MOST_NAMES
     # inches: a name has letters of .07, and a line of .14
-    size = (_style.WIDTH + 0.07 * max(map(len, scan_names)), max(3.2, 0.7 + 0.14 * len(scan_names)))
-    size = size if are_named else (_style.WIDTH, 3.2)
+    size = (_style.WIDTH + 0.07 * max(map(len, scan_names)), max(_style.ROW[1], 0.7 + 0.14 * len(scan_names)))
+    size = size if are_named else _style.ROW
     shown = _style.panel_row(axes, min(len(names), _style.COLUMNS), size)
     panels = [_draw_distribution(ax, data, name) for ax, name in zip(shown, names, strict=False)]
     for ax in shown:

@@ -48,7 +48,7 @@ def islands(result: Any, *, units: Units | None = None, axes: Panels | None = No
     data = result_of(result, ("label", "area"), SEVERAL, units)
     require_dims(data, {"area": "island"})
     require_known_dims(data, {"area": ("island", *SEVERAL)})
-    left, right = shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.2), width_ratios=(1, 1.15))
+    left, right = shown = _style.panel_row(axes, 2, width_ratios=(1, 1.15))
     place = _last_map(data["label"])
     _maps.draw_labels(left, data["label"].isel(place).transpose("y", "x"))
     lines = [_maps.count_text(data["label"].isel(place)), ", ".join(_state_texts(data, place))]
@@ -151,7 +151,7 @@ def evolution(
     lost = "absorbed" if "absorbed" in as_dataset(result).variables else "merges"
     data = result_of(result, ("n_islands", "births", lost), _paths.PATH, units)
     dims, x, family = _paths.path_axis(data, against)
-    shown = _style.panel_row(axes, 2, (_style.WIDTH + 0.6, 3.1), sharex=True)
+    shown = _style.panel_row(axes, 2, _style.WIDE_ROW, sharex=True)
     names = (("n_islands", "number of islands"), ("births", "islands in a step"))
     left, right = (LinePanel(ax, data, x, y, dims, family, y_name=name, points=_style.MAX_MARKED_POINTS)
                    for ax, (y, name) in zip(shown, names, strict=True))  # fmt: skip

@@ -200,7 +200,7 @@ def lacunarity(
 def path_panels(axes: Panels | None, data: xr.Dataset) -> tuple[list[str], AxesArray]:
     """Return the path dims that are longer than one (`step` if none is), and Axes for each of them."""
     dims = [dim for dim in ("step", "shear") if data.sizes[dim] > 1] or ["step"]
-    size = (_style.WIDTH + 0.6, 3.1) if len(dims) > 1 else _style.PANEL
+    size = _style.WIDE_ROW if len(dims) > 1 else _style.PANEL
     return dims, _style.panel_row(axes, len(dims), size)
 
 

@@ -95,7 +95,7 @@ def shear_curve(
 ) -> AxesArray:
     r"""Draw shear stress and dilatancy against shear displacement, one curve per normal stress."""
     data = [_read(each, units) for each in (result, beside) if each is not None]
-    shown = _style.panel_row(axes, 2, (_style.WIDTH, 3.1), sharex=True)
+    shown = _style.panel_row(axes, 2, sharex=True)
     every = {
         name: np.concatenate([np.ravel(each[name].values) for each in data])
         for name in ("nominal_pressure", "shear_displacement", *SHOWN)
@@ -168,7 +168,7 @@ def friction(
     if by_force or direction is not None:
         selected = _paths.select_direction(selected, direction)
     data = result_of(selected, (*names, "shear"), ("shear", over))
-    size = (_style.WIDTH if len(names) > 1 else _style.PANEL[0], 3.1)
+    size = _style.ROW if len(names) > 1 else _style.PANEL
     shown = _style.panel_row(axes, len(names), size, sharex=True)
     family, points = (_paths.by_load if by_force else _paths.by_direction)(data), _style.MAX_MARKED_POINTS
     for ax, name in zip(shown, names, strict=True):

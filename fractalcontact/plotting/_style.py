@@ -26,6 +26,8 @@ Panels: TypeAlias = "Sequence[Axes] | AxesArray | Figure | matplotlib.figure.Sub
 STYLE = "fractalcontact.plotting.report"  # the style of the files that `draw` writes
 # inches, of figures with text of 9 points
 WIDTH = 7.2  # with several panels: A4 less margins of 13 mm
+ROW = (WIDTH, 3.1)  # of panels side by side: the axes are 2.2 to 2.6 high
+WIDE_ROW = (WIDTH + 0.6, 3.1)  # one beside a legend of many curves, or the bar of a map
 PANEL = (5.2, 3.5)  # with one panel and its legend: the axes are 3.3 to 3.5 wide and 3 high
 MAP = (4.6, 3.8)  # with one map and its colour bar: a square map has edges of 3.3
 COLUMNS = 3  # of panels, at most: their axes are 1.7 wide, those of four 1.1, less than the name of an axis
@@ -104,7 +106,7 @@ def number_of_columns(count: int) -> int:
     return 2 if count == 4 else min(count, COLUMNS)
 
 
-def panel_row(axes: Panels | None, count: int, size: tuple[float, float], **layout: Any) -> AxesArray:
+def panel_row(axes: Panels | None, count: int, size: tuple[float, float] = ROW, **layout: Any) -> AxesArray:
     """Return the Axes of panels side by side."""
     row: AxesArray = panels(axes, (1, count), size, **layout)[0]
     return row

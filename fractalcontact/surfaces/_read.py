@@ -229,6 +229,7 @@ def _text_content(request: Request) -> xr.DataArray:
 def _has_coordinates(values: Array) -> bool:
     """Return whether first row and column of a table are evenly spaced beside an empty corner."""
     steps = np.diff(values[0, 1:]), np.diff(values[1:, 0])
+    # thirds that are written with three digits differ by .3 %
     are_even = [each.size > 1 and bool(np.ptp(each) < 0.01 * abs(each[0])) for each in steps]
     return bool(np.isnan(values[0, 0])) and all(are_even)
 
