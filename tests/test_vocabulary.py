@@ -29,8 +29,12 @@ def test_an_argument_has_one_name_and_one_type(subpackage):
         assert annotation.startswith(TYPES.get(argument, "")), f"{subpackage}.{name}: {argument}"
 
 
-@pytest.mark.parametrize(("word", "subpackage"), [("box_sizes", "domains"), ("scales", "dimensions")])
-def test_sets_have_sizes_in_cells_and_surfaces_scales_in_metres(word, subpackage):
+@pytest.mark.parametrize(
+    ("word", "subpackage"),
+    [("box_sizes", "domains"), ("scales", "dimensions"), ("sizes", "accuracy")],
+    ids=("boxes in cells", "lengths in metres", "points along an edge"),
+)
+def test_sizes_and_scales_are_of_one_subpackage(word, subpackage):
     having = {each for each in SUBPACKAGES for _, argument, _ in arguments(each) if argument == word}
     assert having == {subpackage}
 

@@ -22,16 +22,16 @@ def _check(problems: Problems) -> None:
     is_valid = check_surface(problems, reserved=("variation", "window_size", "pair_count", *ALWAYS))
     problems.choice("windows", among=("segments", "squares"))
     problems.choice("mean", among=("arithmetic", "geometric"))
-    if given.sizes is not None and problems.numbers("sizes", above=0) and is_valid:
+    if given.window_sizes is not None and problems.numbers("window_sizes", above=0) and is_valid:
         grid = read_grid(given.surface, core_dims(given.surface))
         shortest, longest = (
             max(grid.spacing),
             min(d * (n - 1) for d, n in zip(grid.spacing, grid.shape, strict=True)),
         )
-        values = np.atleast_1d(np.asarray(given.sizes, dtype=np.float64))
+        values = np.atleast_1d(np.asarray(given.window_sizes, dtype=np.float64))
         is_inside = values.min() >= shortest * (1 - 1e-9) and values.max() <= longest * (1 + 1e-9)
         expected = f"lengths from {shortest:.3g} m (a spacing) to {longest:.3g} m (the surface)"
-        problems.require(bool(is_inside), "sizes", expected)
+        problems.require(bool(is_inside), "window_sizes", expected)
 
 
 @public_result(
@@ -42,7 +42,7 @@ def _check(problems: Problems) -> None:
     memory=40.0,
 )
 def variation(
-    surface: xr.DataArray, sizes: Any = None, *, windows: str = "segments", mean: str = "arithmetic"
+    surface: xr.DataArray, window_sizes: Any = None, *, windows: str = "segments", mean: str = "arithmetic"
 ) -> xr.Dataset:
     """Return the mean range of the heights over windows against their length.
 
@@ -53,7 +53,7 @@ def variation(
     ----------
     surface : DataArray
         Heights in m, dims (..., y, x) or (..., x); windows that contain NaN are left out.
-    sizes : sequence of float, optional
+    window_sizes : sequence of float, optional
         Edges of the windows in m, rounded to whole spacings. By default they double from one spacing to half
         the surface.
     windows : {"segments", "squares"}
@@ -95,7 +95,7 @@ def variation(
     >>> fc.dimensions.variation(ramp, [2.0, 5.0], mean="geometric").variation.values.round(9).tolist()
     [1.0, 2.5]
     """
-    lengths = None if sizes is None else np.sort(np.atleast_1d(np.asarray(sizes, dtype=float)))
+    lengths = None if window_sizes is None else np.sort(np.atleast_1d(np.asarray(window_sizes, dtype=float)))
 
     def measured(single: Surface) -> Curve:
         edges = None if lengths is None else _edges_of(single, lengths)
