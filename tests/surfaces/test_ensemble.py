@@ -4,19 +4,16 @@ import json
 
 import numpy as np
 import pytest
+from calls import CALLS
 
 import fractalcontact as fc
 
-GENERATORS = {
-    "fbm": {"hurst": 0.6, "rms_increment": 1e-6},
-    "midpoint": {"hurst": 0.6, "rms_increment": 1e-6},
-    "spectral": {"hurst": 0.6, "rms_height": 1e-6},
-    "weierstrass": {"hurst": 0.6, "rms_height": 1e-6},
-}
+GENERATORS = ("fbm", "midpoint", "spectral", "weierstrass")
 
 
 def generate(name, shape=(9, 14), spacing=1e-3, rng=1, **options):
-    return getattr(fc.surfaces, name)(shape, spacing, rng=rng, **{**GENERATORS[name], **options})
+    options |= {"shape": shape, "spacing": spacing, "rng": rng}
+    return getattr(fc.surfaces, name)(**(CALLS[f"surfaces.{name}"]() | options))
 
 
 @pytest.mark.parametrize("name", GENERATORS)
@@ -53,6 +50,7 @@ def test_file_has_the_record_to_repeat_its_surface(name, members, tmp_path):
 
 @pytest.mark.parametrize("name", GENERATORS)
 def test_powers_of_two_change_no_bit(name):
-    lengths = {key: 2.0**20 * value for key, value in GENERATORS[name].items() if key != "hurst"}
+    arguments = CALLS[f"surfaces.{name}"]()
+    lengths = {key: 2.0**20 * value for key, value in arguments.items() if key.startswith("rms_")}
     scaled = generate(name, spacing=1e-3 * 2.0**-20, **lengths)
     np.testing.assert_array_equal(scaled.values, generate(name).values * 2.0**20)
