@@ -77,8 +77,8 @@ def stated_argument(provenance: Any, names: Sequence[str]) -> str:
     Of several the first of `names`; empty where none is stated.
     """
     calls = (each.get("parameters") for each in entries_in(provenance))
-    known = (call for call in calls if isinstance(call, dict))
-    return next((name for call in known for name in names if call.get(name) is not None), "")
+    entries = (call for call in calls if isinstance(call, dict))
+    return next((name for call in entries for name in names if call.get(name) is not None), "")
 
 
 def end_of_first_leg(test: xr.Dataset) -> str:

@@ -50,12 +50,12 @@ class Joint:
     @classmethod
     def of(cls, given: Mapping[str, Any], measured: Mapping[str, Any]) -> Joint:
         """Return the joint by all its arguments, None where they are not given, and by what is measured."""
-        known = {name: float(given[name]) for name in ARGUMENTS if given[name] is not None}
+        values = {name: float(given[name]) for name in ARGUMENTS if given[name] is not None}
         defaults = {
-            "tensile_strength": known["wall_strength"] / 10.0,  # of a hard rock (Hoek and Bray 1981)
-            "residual_friction_angle": known["basic_friction_angle"],
+            "tensile_strength": values["wall_strength"] / 10.0,  # of a hard rock (Hoek and Bray 1981)
+            "residual_friction_angle": values["basic_friction_angle"],
         }
-        return cls(**defaults | {name: value.item() for name, value in measured.items()} | known)
+        return cls(**defaults | {name: value.item() for name, value in measured.items()} | values)
 
 
 ARGUMENTS: dict[str, Mapping[str, Any]] = {

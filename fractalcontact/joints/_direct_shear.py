@@ -88,8 +88,8 @@ def _read_path(problems: Problems, crack: Crack, path: Any, towards: Direction) 
         problems.require(bool(reach <= travel + UNIFORM * step), "path", expected, float(reach))
     if problems.messages:
         return []
-    whole = np.rint(cells).astype(np.int64)
-    ends = itertools.pairwise(whole[turning_points(whole)])
+    nearest = np.rint(cells).astype(np.int64)
+    ends = itertools.pairwise(nearest[turning_points(nearest)])
     return [step * np.arange(a, b + np.sign(b - a), np.sign(b - a)) for a, b in ends]
 
 

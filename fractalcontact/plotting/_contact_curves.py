@@ -123,8 +123,8 @@ def path(
     names = (variable,) if isinstance(variable, str) else tuple(variable)
     given = () if against is None else (against,)
     data = result_of(result, (*names, *given), PATH, units)
-    found = dict.fromkeys(data[name].attrs.get("units", "1") for name in names)
-    require(len(found) == 1, "variable", "variables of one unit", ", ".join(found))
+    distinct = dict.fromkeys(data[name].attrs.get("units", "1") for name in names)
+    require(len(distinct) == 1, "variable", "variables of one unit", ", ".join(distinct))
     dims, x, family = _paths.path_axis(data, against)
     values = [table(data, name, dims) for name in names]
     title = ", ".join(name_of(data[name]) for name in names)
@@ -148,8 +148,8 @@ def _own_variables(result: Any) -> list[str]:
     """Return the name of a DataArray, or the variables that a result states for its figure."""
     is_one = isinstance(result, xr.DataArray) and result.name is not None
     names = [str(result.name)] if is_one else str(result.attrs.get("path_figure", "")).split()
-    known = ", ".join(map(str, getattr(result, "data_vars", ())))
-    require(bool(names), "variable", f"one of {known}: the result has no standard figure")
+    variables = ", ".join(map(str, getattr(result, "data_vars", ())))
+    require(bool(names), "variable", f"one of {variables}: the result has no standard figure")
     return names
 
 

@@ -107,9 +107,9 @@ def as_dataset(data: Any, argument: str = "result") -> xr.Dataset:
 def require_variables(dataset: xr.Dataset, names: Sequence[str], argument: str = "result") -> None:
     """Raise InvalidInput unless the variables are present."""
     with Problems("fc.plotting") as problems:
-        known = list(dataset.variables)
+        present = list(dataset.variables)
         for name in names:
-            problems.require(name in known, argument, f"the variable {name!r}", known)
+            problems.require(name in present, argument, f"the variable {name!r}", present)
 
 
 def require_dims(dataset: xr.Dataset, dims: Mapping[str, str]) -> None:
@@ -124,9 +124,11 @@ def require_dims(dataset: xr.Dataset, dims: Mapping[str, str]) -> None:
 def require_known_dims(dataset: xr.Dataset, dims: Mapping[str, Sequence[str]]) -> None:
     """Raise InvalidInput if one of the variables has another dim than these."""
     with Problems("fc.plotting") as problems:
-        for name, known in dims.items():
+        for name, allowed in dims.items():
             own = dataset[name].dims
-            problems.require(set(own) <= set(known), f"result.{name}", f"dims out of {', '.join(known)}", own)
+            problems.require(
+                set(own) <= set(allowed), f"result.{name}", f"dims out of {', '.join(allowed)}", own
+            )
 
 
 def table(data: xr.Dataset, name: str, dims: Sequence[Hashable]) -> Array:

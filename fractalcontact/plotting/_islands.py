@@ -118,8 +118,8 @@ def _masks_of(data: xr.Dataset) -> tuple[Family, list[Any]]:
 
 def _places(data: xr.Dataset, dim: str) -> Array:
     """Return for each island its place along a dim of the masks, -1 where its mask was not chosen."""
-    known = data[dim].values if dim in data.coords else np.arange(data.sizes[dim])
-    is_known = data[f"island_{dim}"].values[:, None] == known
+    places = data[dim].values if dim in data.coords else np.arange(data.sizes[dim])
+    is_known = data[f"island_{dim}"].values[:, None] == places
     return np.where(is_known.any(axis=1), is_known.argmax(axis=1), -1)
 
 

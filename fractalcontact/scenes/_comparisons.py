@@ -86,14 +86,14 @@ def _energy_form(tree: xr.DataTree) -> str:
     form = provenance_of(friction).get("parameters", {}).get("form")
     if form != "kinematic" or "elastic_energy" not in elastic or "plastic_work" in elastic:
         return ""
-    known = friction["peak_friction_angle"].notnull()
+    has_peak = friction["peak_friction_angle"].notnull()
     angle = public_function("joints.friction")(  # over the same distance, of every member
         elastic,
         basic_friction_angle=float(friction["basic_friction_angle"].mean()),
         form="energy",
         distance=float(friction["peak_distance"].max()),
     )["peak_friction_angle"]
-    more, locked = finite(angle - friction["peak_friction_angle"]), int((known & angle.isnull()).sum())
-    found = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
-    found += [f"locks the faces in {locked} of {int(known.sum())} cases"] if locked else []
-    return " and ".join(found)
+    more, locked = finite(angle - friction["peak_friction_angle"]), int((has_peak & angle.isnull()).sum())
+    effects = [f"gives {more.min():+.1f} to {more.max():+.1f} degree"] if more.size else []
+    effects += [f"locks the faces in {locked} of {int(has_peak.sum())} cases"] if locked else []
+    return " and ".join(effects)

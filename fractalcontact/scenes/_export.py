@@ -93,8 +93,10 @@ def groups_of(result: xr.DataTree | xr.Dataset) -> list[tuple[str, xr.Dataset]]:
 
 def _sets_of_dims(dataset: xr.Dataset) -> list[tuple[str, ...]]:
     """Return the dims of the variables, each set once, without those of maps."""
-    found = dict.fromkeys(tuple(str(dim) for dim in variable.dims) for variable in dataset.data_vars.values())
-    return sorted((dims for dims in found if not set(dims) >= MAP_DIMS), key=len)
+    groups = dict.fromkeys(
+        tuple(str(dim) for dim in variable.dims) for variable in dataset.data_vars.values()
+    )
+    return sorted((dims for dims in groups if not set(dims) >= MAP_DIMS), key=len)
 
 
 def _frame(dataset: xr.Dataset, dims: tuple[str, ...]) -> Any:
@@ -281,8 +283,10 @@ def _write_tiff(dataset: xr.Dataset, name: str, leading: tuple[str, ...], path: 
 def _label(field: xr.DataArray, leading: tuple[str, ...], index: tuple[int, ...]) -> str:
     """Return the coordinates of a plane in words: shear (m) = 0.0002, normal_force (N) = 300."""
     plane = field[index]
-    known = {name: coord for name, coord in plane.coords.items() if coord.ndim == 0}
-    words = [f"{heading(field.to_dataset(name='map'), str(name))} = {c.item()}" for name, c in known.items()]
+    scalars = {name: coord for name, coord in plane.coords.items() if coord.ndim == 0}
+    words = [
+        f"{heading(field.to_dataset(name='map'), str(name))} = {c.item()}" for name, c in scalars.items()
+    ]
     return ", ".join(words) or ", ".join(f"{dim} {n}" for dim, n in zip(leading, index, strict=True))
 
 

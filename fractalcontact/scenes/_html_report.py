@@ -124,8 +124,8 @@ def report(
     tree = result if isinstance(result, xr.DataTree) else open_result(result)
     target = Path(path) if path is not None else Path(str(result)).with_name(REPORT)
     with Problems(WHERE) as problems:
-        found = f"a {type(tree).__name__}"
-        problems.require(isinstance(tree, xr.DataTree), "result", "the file of a study", found)
+        got = f"a {type(tree).__name__}"
+        problems.require(isinstance(tree, xr.DataTree), "result", "the file of a study", got)
         is_free = not target.is_file() or is_report(target)
         problems.require(is_free, "path", "a new file, or a report of this package", target.name)
     tree = tree.filter(lambda node: not node.path.startswith(f"/{SCANS}/"))  # each has a page of its own
@@ -220,14 +220,14 @@ def _surface(tree: xr.DataTree, most: int = 128) -> dict[str, Any] | None:
     block = math.ceil(max(height.shape) / most)
     coarse = height.coarsen(y=block, x=block, boundary="trim").mean() if block > 1 else height
     values = np.asarray(coarse.values, dtype=float)
-    known = np.isfinite(values)
-    if min(values.shape) < 2 or not known.any():
+    is_finite = np.isfinite(values)
+    if min(values.shape) < 2 or not is_finite.any():
         return None
-    lowest, highest = float(values[known].min()), float(values[known].max())
+    lowest, highest = float(values[is_finite].min()), float(values[is_finite].max())
     extent = read_grid(coarse).extent
-    scaled = np.where(known, (values - lowest) / ((highest - lowest) or 1.0), 0.0)
+    scaled = np.where(is_finite, (values - lowest) / ((highest - lowest) or 1.0), 0.0)
     missing = np.iinfo("<u2").max  # the level of a point without height
-    levels = np.where(known, np.rint(scaled * (missing - 1)), missing).astype("<u2")
+    levels = np.where(is_finite, np.rint(scaled * (missing - 1)), missing).astype("<u2")
     return {
         "heights": base64.b64encode(levels.tobytes()).decode(),
         "shape": list(coarse.shape),

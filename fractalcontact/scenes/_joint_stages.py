@@ -102,17 +102,17 @@ def _peak_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
     """Yield how the peaks depend on their distance, and what the kinematic form leaves out of them."""
     if "peak_shear_strength" not in data:
         return
-    known = data["peak_friction_angle"].notnull()
-    if not known.any():
+    has_peak = data["peak_friction_angle"].notnull()
+    if not has_peak.any():
         return
     if comment := data["peak_friction_angle"].attrs.get("comment"):
         change = _strength_over_half(data) if comment.startswith("changes") else None
         strength = f" The strength changes by up to {100 * change:.0f} %." if change else ""
         yield f"The peak friction angle {comment}.{strength}"
-    if found := tree.attrs.get("energy_form"):
+    if form := tree.attrs.get("energy_form"):
         yield (
             "It is that of the kinematic form, which leaves out the elastic energy that the faces store "
-            f'while they slide: form = "energy" {found}.'
+            f'while they slide: form = "energy" {form}.'
         )
 
 

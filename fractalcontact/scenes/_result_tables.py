@@ -186,11 +186,11 @@ def _key(dim: str, state: xr.Dataset, data: xr.Dataset, rows: Rows) -> str:
 
 def _cells(column: Column, states: Sequence[xr.Dataset]) -> list[str] | None:
     """Return the cells of a column; None where the result does not have it."""
-    found = [_value(column, state) for state in states]
-    if all(item is None for item in found):
+    values = [_value(column, state) for state in states]
+    if all(item is None for item in values):
         return None
-    scale = _scale_of([item for item in found if isinstance(item, xr.DataArray)])
-    return [cell(item, column.decimals, scale) if item is not None else "-" for item in found]
+    scale = _scale_of([item for item in values if isinstance(item, xr.DataArray)])
+    return [cell(item, column.decimals, scale) if item is not None else "-" for item in values]
 
 
 def _value(column: Column, state: xr.Dataset) -> Any:
@@ -250,11 +250,11 @@ def amount(data: Any, scale: Scale | None = None) -> str:
     """
     units = units_of(data.name, data.attrs)
     values = without_rounding(data.values, units)
-    known = values[np.isfinite(values)]
+    finite_values = values[np.isfinite(values)]
     if str(data.name) in FRACTIONS:
         scale = Scale(0.01, "%")
     elif scale is None:
-        scale = scale_for(units, float(known.mean()) if known.size else np.nan)
+        scale = scale_for(units, float(finite_values.mean()) if finite_values.size else np.nan)
     unit = f" {scale.unit}".rstrip()
     return _over_members(scale(values), number, _decimals_of, unit)
 
@@ -288,15 +288,15 @@ def _over_members(
     `text` writes a single value; `decimals` gives those of the mean and of the deviation from the deviation.
     """
     values = np.asarray(values, dtype=float)
-    known = values[np.isfinite(values)]
-    if known.size == 0:
+    finite_values = values[np.isfinite(values)]
+    if finite_values.size == 0:
         return "-"
-    share = share_of(known.size, values.size)
-    if values.ndim == 0 or are_one(known):
-        return text(float(known[0])) + unit + share
-    spread = float(np.std(known, ddof=1))
-    digits, sign = decimals(spread), text(float(known.mean())).startswith("+")
-    mean, spread = (round(value, digits) for value in (float(known.mean()), spread))
+    share = share_of(finite_values.size, values.size)
+    if values.ndim == 0 or are_one(finite_values):
+        return text(float(finite_values[0])) + unit + share
+    spread = float(np.std(finite_values, ddof=1))
+    digits, sign = decimals(spread), text(float(finite_values.mean())).startswith("+")
+    mean, spread = (round(value, digits) for value in (float(finite_values.mean()), spread))
     shown = max(digits, 0)  # 18 700 ± 2100 has its last digits in front of the point
     return f"{fixed(mean, shown, sign=sign)} ± {fixed(spread, shown)}{unit}{share}"
 

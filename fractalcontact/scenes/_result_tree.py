@@ -124,9 +124,9 @@ def _achieved(result: xr.Dataset) -> dict[str, Any]:
 def _errors_by_method(estimates: xr.Dataset) -> Iterator[str]:
     """Yield each method with its standard error; with the ends over the members of an ensemble."""
     for name in estimates["method"].values:
-        known = finite(estimates["standard_error"].sel({"method": name}))
-        if known.size:
-            yield f"{name} {span(known, '{:.4f}'.format)}"
+        errors = finite(estimates["standard_error"].sel({"method": name}))
+        if errors.size:
+            yield f"{name} {span(errors, '{:.4f}'.format)}"
 
 
 OVERVIEW = "overview"  # group: a row for every scan
@@ -206,10 +206,10 @@ def tree_of_scans(scene: Scene, reasons: Mapping[str, str], numbers: Mapping[str
     means = pooled(overview)
     done = {name: "incomplete" if reasons[name] else "done" for name in numbers}
     caveats = {name: str(each[""].attrs.get("caveats", "none")) for name, each in numbers.items()}
-    found = [caveats.get(name, "none") for name in reasons]
+    texts = [caveats.get(name, "none") for name in reasons]
     overview["status"] = (SCAN, [done.get(name, "failed") for name in reasons])
     overview["reason"] = (SCAN, list(reasons.values()), {"long_name": "why it failed"})
-    overview["caveats"] = (SCAN, ["" if text == "none" else text for text in found])
+    overview["caveats"] = (SCAN, ["" if text == "none" else text for text in texts])
     groups[OVERVIEW] = schema.label(overview)
     stages = (provenance_of(each[""]).get("stages", {}).items() for each in numbers.values())
     seconds = total_seconds({name: facts["run_time"] for name, facts in each} for each in stages)
@@ -239,7 +239,7 @@ def pooled(main: xr.Dataset) -> xr.Dataset:
         values = on_scale(str(key), values)
         has_errors = key == DIMENSION and ERROR in main and main[ERROR].notnull().any()
         errors = main[ERROR].values if has_errors else 0.0
-        found = random_effects(values.values, errors)
+        estimate = random_effects(values.values, errors)
         # D lies between two whole numbers, a share of an area is no more than all of it; what is negative in
         # no scan is so in no mean
         is_dimension = key == DIMENSION
@@ -247,14 +247,14 @@ def pooled(main: xr.Dataset) -> xr.Dataset:
         smallest = float(np.fmin(values.min(), ends.min()))
         least = float(np.floor(smallest)) if is_dimension else 0.0 if smallest >= 0.0 else -np.inf
         most = least + 1.0 if is_dimension else 1.0 if key in FRACTIONS else np.inf
-        low, high = np.clip((found.low, found.high), least, most)
+        low, high = np.clip((estimate.low, estimate.high), least, most)
         text = f"{values.attrs['long_name']}: "
         facts = {
-            "": (found.mean, f"mean over {found.count} scans (random effects)"),
+            "": (estimate.mean, f"mean over {estimate.count} scans (random effects)"),
             "_low": (float(low), "lower end of the 95 % interval of the mean over scans"),
             "_high": (float(high), "upper end of the 95 % interval of the mean over scans"),
-            "_scatter": (found.between, "standard deviation between scans, without the error within each"),
-            "_scans": (float(found.count), "number of scans that have a value"),
+            "_scatter": (estimate.between, "standard deviation between scans, without the error within each"),
+            "_scans": (float(estimate.count), "number of scans that have a value"),
         }
         for ending, (value, words) in facts.items():
             units = "1" if ending == "_scans" else values.attrs["units"]
@@ -306,8 +306,8 @@ def scan_facts(tree: xr.DataTree) -> Iterator[str]:
     columns = {
         each.column.head: on_scale(each.name, overview[each.name]) for each in MAIN if each.name in overview
     }
-    found = {head: is_far(values.values) for head, values in columns.items()}
-    texts = [f"{head} of {_few(names[is_one])}" for head, is_one in found.items() if is_one.any()]
+    outliers = {head: is_far(values.values) for head, values in columns.items()}
+    texts = [f"{head} of {_few(names[is_one])}" for head, is_one in outliers.items() if is_one.any()]
     if texts:
         yield f"outliers: {'; '.join(texts)}"
     caveats = [name for name, text in zip(names, overview["caveats"].values, strict=True) if text]

@@ -235,8 +235,8 @@ def _check_surface(table: Table, name: str, problems: Problems) -> None:
         _check_table(table, forms[form], name, problems)
     else:  # all keys have a meaning that one of the forms gives them
         kinds = {key: kind for each in forms.values() for key, kind in each.kinds.items()}
-        known = {key: value for key, value in table.items() if key in kinds}
-        _check_table(known, Keys(kinds), name, problems)
+        checked = {key: value for key, value in table.items() if key in kinds}
+        _check_table(checked, Keys(kinds), name, problems)
 
 
 def _check_table(table: Table, keys: Keys, name: str, problems: Problems) -> None:
@@ -342,9 +342,9 @@ def _files(read: Any, place: str, folder: Path, problems: Problems) -> dict[str,
     if not is_pattern(read, folder):
         files = read if isinstance(read, list) else [read]
         return {str(number): str(file) for number, file in enumerate(files)}
-    found = files_of(read, folder)
-    problems.require(bool(found), f"{place}.read", "a pattern with files", Words(f"{read!r} without any"))
-    return found
+    matching = files_of(read, folder)
+    problems.require(bool(matching), f"{place}.read", "a pattern with files", Words(f"{read!r} without any"))
+    return matching
 
 
 def _check_pairs(

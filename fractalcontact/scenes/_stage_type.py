@@ -41,9 +41,9 @@ def parameters_of(function: str) -> dict[str, inspect.Parameter]:
 @cache
 def arguments_of(function: str) -> tuple[tuple[str, ...], frozenset[str]]:
     """Return the arguments of a public function that a scene may give, and those without a default."""
-    known = {key: value for key, value in parameters_of(function).items() if key not in FROM_SCENE}
-    required = frozenset(key for key, value in known.items() if value.default is value.empty)
-    return tuple(key for key in known if key != MATERIAL_ALONE), required
+    arguments = {key: value for key, value in parameters_of(function).items() if key not in FROM_SCENE}
+    required = frozenset(key for key, value in arguments.items() if value.default is value.empty)
+    return tuple(key for key in arguments if key != MATERIAL_ALONE), required
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,8 @@ class StageType:
     def needed(self) -> tuple[str, ...]:
         """Return the arguments that a scene must give."""
         without_default = arguments_of(self.function)[1]
-        known = self.keys or parameters_of(self.function)
-        return (*self.required, *(key for key in known if key in without_default))
+        keys = self.keys or parameters_of(self.function)
+        return (*self.required, *(key for key in keys if key in without_default))
 
 
 def stage_type(

@@ -295,7 +295,7 @@ def _member_memory(
     except InvalidInput:
         return {}, {}
     surface, block = Plane(shape, generator in PERIODIC), Plane(_inputs.block_shape(scene, shape, spacing))
-    held = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
+    resident = 8.0 * surface.cells * (2 if scene.upper is not None else 1)
     loaded: set[str] = set()
     peaks: dict[str, float] = {}
     stored: dict[str, float] = {}
@@ -303,10 +303,10 @@ def _member_memory(
         loaded.add(stage.row.subpackage)
         libraries = _libraries(loaded)
         if stage.name == FIGURES:
-            peaks[stage.name] = libraries + held + 24.0 * surface.cells  # a map and its colours
+            peaks[stage.name] = libraries + resident + 24.0 * surface.cells  # a map and its colours
             continue
         if stage.name == "surfaces":
-            peaks[stage.name] = libraries + max(held, _surface_memory(scene, surface))
+            peaks[stage.name] = libraries + max(resident, _surface_memory(scene, surface))
             stored[stage.name] = 8.0 * surface.cells if stage.stored else 0.0
             continue
         takes = stage.row.takes
@@ -320,8 +320,8 @@ def _member_memory(
         working = bytes_on(estimate, Plane(plane.shape, plane.periodic, planes), call)
         states = plane.cells * steps * shears
         maps = sum(map(map_bytes, stage.keep)) * states
-        peaks[stage.name] = libraries + held + max(working, 2.0 * maps)
-        held += maps
+        peaks[stage.name] = libraries + resident + max(working, 2.0 * maps)
+        resident += maps
         stored[stage.name] = maps - sum(map(map_bytes, stage.internal)) * states
     return peaks, stored
 

@@ -354,8 +354,8 @@ def _preparation_of_members(facts: Mapping[int, Mapping[str, Any]]) -> dict[str,
     first, own = next(iter(facts.items()), (0, {}))
     words = [f"member {first}: {text}" for text in own.get("preparation", "").split("; ") if text]
     shares = [each["plane_share"] for each in facts.values() if "plane_share" in each]
-    found = {"preparation": "; ".join(words), "plane_share": shares}
-    return {name: fact for name, fact in found.items() if fact}
+    attributes = {"preparation": "; ".join(words), "plane_share": shares}
+    return {name: fact for name, fact in attributes.items() if fact}
 
 
 def total_seconds(of_studies: Iterable[Mapping[str, float]]) -> dict[str, float]:

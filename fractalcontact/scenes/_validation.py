@@ -81,8 +81,8 @@ def validated(scene: Scene | str | os.PathLike[str]) -> tuple[Scene, dict[str, x
         return scene, {}
     with problems:
         if not _is_valid(problems, "material"):
-            known = {key: table for key, table in scene.tables.items() if key != "material"}
-            scene = replace(scene, tables=known)
+            tables = {key: table for key, table in scene.tables.items() if key != "material"}
+            scene = replace(scene, tables=tables)
         if not _is_valid(problems, "want"):
             scene = _with_possible_want(scene)
         surfaces = _validate_surfaces(scene, problems)
@@ -264,11 +264,11 @@ def _validate_calls(
 
 def _validate_call(name: str, *arguments: Any, **options: Any) -> None:
     """Validate a call that has all arguments it needs; what is missing was noted before."""
-    known = parameters_of(name)  # an unknown key was noted before
-    if "contact_modulus" in known:
+    parameters = parameters_of(name)  # an unknown key was noted before
+    if "contact_modulus" in parameters:
         options.setdefault("contact_modulus", None)  # of a material that is not valid
-    options = {key: value for key, value in options.items() if key in known}
-    others = list(known.values())[len(arguments) :]
+    options = {key: value for key, value in options.items() if key in parameters}
+    others = list(parameters.values())[len(arguments) :]
     if all(each.name in options for each in others if each.default is each.empty):
         public_function(name).validate(*arguments, **options)  # type: ignore[attr-defined]
 

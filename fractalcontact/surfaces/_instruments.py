@@ -247,8 +247,8 @@ def _check_raster(raster: Any, band: int, request: Request) -> None:
             dtype, stated = raster.dtypes[band - 1], raster.units[band - 1]
             problems.require(np.dtype(dtype).kind in "fiu", "path", "real heights", dtype)
             # a system in feet has heights in its feet
-            known = (None, "", *UNITS, *METRES, raster.crs.linear_units if raster.crs else None)
-            is_unit = request.units is not None or stated in known
+            units = (None, "", *UNITS, *METRES, raster.crs.linear_units if raster.crs else None)
+            is_unit = request.units is not None or stated in units
             problems.require(is_unit, "path", 'a unit of length; give `units` ("m", "mm" ...)', stated)
         expected = "None for a raster, which has its y, or the top of the image first"
         problems.require(request.first_row is None, "first_row", expected, request.first_row)
