@@ -37,7 +37,7 @@ TAPERED = 0.25  # information of a mode under sin^2 along both axes, about (18/3
 # than the pilot 18, 1.6)
 _SAMPLES = 64, 256
 _MEDIAN_SAMPLE = 4096  # modes of which a median is taken: error of 2 %, below what waves or a lay must exceed
-# Radians per point: aliases of longer waves differ by azimuth by less than 5 % for H above .1
+# Radians per point of their axis: aliases of longer waves differ by azimuth by less than 5 % for H above .1
 _ALIASED = math.pi / 3.0
 FALSE_ALARM = 0.01  # chance that a surface without single waves, or a lay, is corrected for them
 _SECTORS = 9  # of azimuth in a quarter of the plane: an odd number, so that no sector ends at the diagonal
@@ -183,9 +183,9 @@ def levels_by_azimuth(lattice: Lattice, ratio: Array, keep: Array) -> Levels:
     """Return the levels of some modes; `ratio` is their power over that expected."""
     y, x = lattice.wavenumbers
     # aliases and filters of the points differ by azimuth among the shorter waves, and belong to the model
-    limit = _ALIASED / max(lattice.spacing)
-    near_y, near_x = (np.flatnonzero(np.abs(along) < limit) for along in (y, x))
-    is_near = np.hypot(y[near_y, None], x[near_x]) < limit
+    by_y, by_x = (along * step for along, step in zip((y, x), lattice.spacing, strict=True))
+    near_y, near_x = (np.flatnonzero(np.abs(by) < _ALIASED) for by in (by_y, by_x))
+    is_near = np.hypot(by_y[near_y, None], by_x[near_x]) < _ALIASED
     rows, columns = np.nonzero(keep[np.ix_(near_y, near_x)] & is_near)
     rows, columns = near_y[rows], near_x[columns]
     sector = _sectors(y[rows], x[columns])
