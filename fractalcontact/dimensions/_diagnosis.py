@@ -38,19 +38,19 @@ def diagnose(surface: Surface, *, is_window: bool = False) -> str:
 
 
 def resampling(surface: Surface, linear: float = 0.01) -> str:
-    """Return that points were interpolated or repeated; empty where they were not.
+    """Return that points were repeated, interpolated or replaced by medians; empty where they were not.
 
     `linear`: share of heights exactly on a line with their neighbours; measured heights have none.
     """
-    if surface.linear_share > linear:
-        return (
-            "many heights lie exactly on lines between neighbours: they were interpolated; grid the points "
-            "with fractalcontact.surfaces.from_points, or give `scales` from eight distances of points on"
-        )
     if surface.is_enlarged:
         return (
             "many rows or columns repeat their neighbours: the surface was enlarged; remove the repeated "
             "ones, or give `scales` from eight blocks on"
+        )
+    if surface.linear_share > linear:
+        return (
+            "many heights lie exactly on lines between neighbours: they are interpolated or medians; give "
+            "the points to fractalcontact.surfaces.from_points, or `scales` from eight distances of points on"
         )
     return ""
 

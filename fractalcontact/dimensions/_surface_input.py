@@ -194,7 +194,7 @@ class Surface:
         """
         for lines in (self._middle, self._middle.T):
             starts = np.flatnonzero((lines[1:] != lines[:-1]).any(axis=1))
-            if 2 < len(starts) < (1.0 - NOTABLE_SHARE) * (len(lines) - 1):
+            if 2 < len(starts) < (1.0 - NOTABLE_SHARE) * (starts[-1] - starts[0]):
                 apart = np.abs(starts - np.linspace(starts[0], starts[-1], len(starts))).max()
                 if apart <= 1.0:
                     return True

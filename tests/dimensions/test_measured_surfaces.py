@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from counting import at_least
 from scipy.interpolate import griddata
-from scipy.ndimage import gaussian_filter, gaussian_filter1d, map_coordinates, uniform_filter
+from scipy.ndimage import gaussian_filter, gaussian_filter1d, map_coordinates, median_filter, uniform_filter
 
 import fractalcontact as fc
 
@@ -198,7 +198,9 @@ DEFECTS = {
     "spikes": (spiked, "despike"),
     "seam": (tiled, "seams"),
     "enlarged": (lambda z: np.repeat(np.repeat(z[:64, :64], 2, axis=0), 2, axis=1), "enlarged"),
+    "rows three times": (lambda z: np.repeat(z[:48], 3, axis=0), "repeat their neighbours"),
     "interpolated": (interpolated, "interpolated"),
+    "median filter": (lambda z: median_filter(z, 3), "medians"),
     "lowest missing": (lambda z: np.where(z < np.quantile(z, 0.1), np.nan, z), "low heights are missing"),
 }
 
@@ -213,6 +215,14 @@ def test_defects_have_a_reason_and_no_interval(defect):
     result = estimated(change(brownian(0.6, 9)))
     assert np.isnan([float(result.ci_low), float(result.standard_error)]).all()
     assert words in str(result.reason.values)
+
+
+def test_rows_of_a_margin_are_no_enlargement():
+    """Once the reason was an enlarged surface."""
+    heights = brownian(0.6, 9)
+    heights[:20] = heights[20]
+    result = estimated(heights)
+    assert float(result.ci_low) < 0.6 < float(result.ci_high)
 
 
 @pytest.mark.parametrize("defect", [pytest.param("enlarged", marks=pytest.mark.slow), "interpolated"])
