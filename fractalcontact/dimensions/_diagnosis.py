@@ -1,5 +1,5 @@
 """What no exponent describes: spikes, seams, levelled rows, repeated or interpolated points, missing
-extremes.
+extremes, products of profiles.
 
 Each is named with the preparation step that removes it; `estimate` then gives no interval. Nothing is
 repaired here.
@@ -34,6 +34,7 @@ def diagnose(surface: Surface, *, is_window: bool = False) -> str:
         or _seams(surface.heights, rounding_step(surface))
         or _spikes(surface.heights)
         or _missing_extremes(surface.heights)
+        or _product(surface.heights)
     )
 
 
@@ -172,6 +173,22 @@ def _seams(heights: Array, step: float, points: int = 512) -> str:
                 "one by one, or level them first"
             )
     return ""
+
+
+def _product(heights: Array, lines: int = 32, share: float = 0.9999) -> str:
+    """Look for a product f(x) g(y): its mixed differences, between some even `lines`, have rank one.
+
+    `share`: of their squares. Of 810 surfaces of all kinds of the accuracy page, 33 to 128 points a side, one
+    component has .69 at most; blurred by 8 of 33 points .9988.
+    """
+    down, across = (max(1, n // lines) for n in heights.shape)
+    bends = np.diff(np.diff(heights[::down, ::across], axis=0), axis=1)
+    if min(bends.shape) < lines - 1 or not np.isfinite(bends.sum()):
+        return ""
+    squares = np.square(np.linalg.svd(bends, compute_uv=False))
+    if not squares[0] > share * squares.sum():
+        return ""
+    return "the heights are a product of a profile along x and one along y: estimate a row and a column alone"
 
 
 def _missing_extremes(heights: Array, edge: int = 15) -> str:

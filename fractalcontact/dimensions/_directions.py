@@ -216,9 +216,8 @@ def _dataset(
         name: by_direction([[getattr(record, name) for record in result.estimates] for result in results])
         for name in _BY_DIRECTION
     }
-    data["topothesy"] = by_direction(
-        [[record.topothesy(spacing) for record in result.estimates] for result in results]
-    )
+    topothesies = [[record.topothesy(spacing) for record in result.estimates] for result in results]
+    data["topothesy"] = by_direction(topothesies)
     for name in _OF_SURFACE:
         values = [np.nan if r.anisotropy is None else getattr(r.anisotropy, name) for r in results]
         data[name] = (leading, np.reshape(values, shape))

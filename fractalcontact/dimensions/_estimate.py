@@ -147,9 +147,8 @@ def estimate(
     names = ("default",) if methods is None else word_tuple(methods)
     if is_lazy(surface) and set(map(_row, names)) - set(IN_BLOCKS):
         where, size = "fractalcontact.dimensions.estimate", math.prod(surfaces[0].shape)
-        require_memory(
-            where, ALL_HEIGHTS * size, f"{size} heights at once; in blocks: {', '.join(IN_BLOCKS)}"
-        )
+        needed = f"{size} heights at once; in blocks: {', '.join(IN_BLOCKS)}"
+        require_memory(where, ALL_HEIGHTS * size, needed)
         announce_loading(where, {"surface": surface})
     estimates, times = [], np.zeros((len(surfaces), len(names)))
     for row, single in enumerate(surfaces):

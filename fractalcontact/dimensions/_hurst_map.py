@@ -143,9 +143,8 @@ def hurst_map(
     edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
     length = 0.5 * window if step is None else min(float(step), max(grid.extent))
     steps = [max(1, int(nearest_whole(length / spacing))) for spacing in grid.spacing]
-    rows, columns = (
-        np.arange(0, n - edge + 1, jump) for n, edge, jump in zip(grid.shape, edges, steps, strict=True)
-    )
+    along_axes = zip(grid.shape, edges, steps, strict=True)
+    rows, columns = (np.arange(0, n - edge + 1, step) for n, edge, step in along_axes)
     windows = _Windows((edges[0], edges[1]), rows, columns, steps)
     leading = surface.dims[:-2]
     records: list[Estimate] = []

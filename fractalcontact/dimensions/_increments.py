@@ -49,9 +49,8 @@ def increments(surface: Surface, scales: Scales, noise: float | None) -> Estimat
     is_inside = between(lags, scales)
     is_inside &= np.count_nonzero(is_inside, axis=1, keepdims=True) > 1
     if scales is not None and not is_inside.any():
-        return undefined(
-            f"two lags m and 2 m spacings are needed between {scales[0]:g} m and {scales[1]:g} m"
-        )
+        reason = f"two lags m and 2 m spacings are needed between {scales[0]:g} m and {scales[1]:g} m"
+        return undefined(reason)
     moments = increment_moments(surface.slabs(REACH * stride), surface.grid.shape, stride)
     first, second = moments.means[[0, 6]], moments.means[[3, 9]]
     if not np.nansum(first) > 0:
@@ -227,12 +226,9 @@ def increment_moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...]
         blocks = (_ratio(block_sums, block_counts), block_counts)
     observed = None
     if any(mask is not None for mask in masks):
-        observed = np.concatenate(
-            [
-                np.ones((len(sums), shape[-1]), dtype=bool) if mask is None else mask
-                for mask, sums in zip(masks, row_sums, strict=True)
-            ]
-        )
+        pairs, nx = zip(masks, row_sums, strict=True), shape[-1]
+        seen = [np.ones((len(sums), nx), dtype=bool) if mask is None else mask for mask, sums in pairs]
+        observed = np.concatenate(seen)
     return Moments(_ratio(total, number), number, shape, stride, observed, blocks)
 
 
@@ -405,10 +401,8 @@ def _quadrature(n: int) -> tuple[Array, Array]:
         edges.append(min(n, edges[-1] + max(1, int(_GROWTH * edges[-1]))))
     low, high = np.array(edges[:-1]), np.array(edges[1:])
     middle, width = (low + high - 1) // 2, high - low
-    return (
-        np.concatenate([-middle[::-1], [0], middle]).astype(float),
-        np.concatenate([width[::-1], [1], width]).astype(float),
-    )
+    shifts, widths = [*-middle[::-1], 0, *middle], [*width[::-1], 1, *width]
+    return np.array(shifts, dtype=float), np.array(widths, dtype=float)
 
 
 class _IncrementCovariance:

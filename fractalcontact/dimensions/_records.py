@@ -93,9 +93,8 @@ class Estimate:
         hurst, low, high = (float(np.clip(h, 0.0, 1.0)) for h in (self.hurst, self.ci_low, self.ci_high))
         limited = replace(self, hurst=hurst, ci_low=low, ci_high=high, fitted_hurst=self.hurst)
         if self.ci_low > 1.0 or self.ci_high < 0.0:
-            limited = limited.without_interval(
-                f"the fitted exponent, {self.hurst:.3f}, is that of no fractal: choose other scales"
-            )
+            reason = f"the fitted exponent, {self.hurst:.3f}, is that of no fractal: choose other scales"
+            limited = limited.without_interval(reason)
         if -_ROUNDING <= self.hurst <= 1.0 + _ROUNDING:
             return limited
         side = "smoother" if self.hurst > 1.0 else "rougher"

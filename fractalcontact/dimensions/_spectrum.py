@@ -117,10 +117,8 @@ def ring_curve(surface: Surface, window: str = "auto", tile: int | None = None) 
     axes, spacing = surface.axes, surface.grid.spacing
     shape = surface.grid.shape if tile is None else (tile,) * axes
     periodic = surface.grid.periodic if tile is None else (False,) * axes
-    tapers = tuple(
-        "hann" if window == "hann" or (window == "auto" and not is_periodic) else None
-        for is_periodic in periodic
-    )
+    tapered = [window == "hann" or (window == "auto" and not is_periodic) for is_periodic in periodic]
+    tapers = tuple("hann" if is_tapered else None for is_tapered in tapered)
     total: Array | None = None
     number = 0
     for part in _tiles(surface, tile):

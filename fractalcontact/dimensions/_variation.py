@@ -24,10 +24,8 @@ def _check(problems: Problems) -> None:
     problems.choice("mean", among=("arithmetic", "geometric"))
     if given.window_sizes is not None and problems.numbers("window_sizes", above=0) and is_valid:
         grid = read_grid(given.surface, core_dims(given.surface))
-        shortest, longest = (
-            max(grid.spacing),
-            min(d * (n - 1) for d, n in zip(grid.spacing, grid.shape, strict=True)),
-        )
+        shortest = max(grid.spacing)
+        longest = min(d * (n - 1) for d, n in zip(grid.spacing, grid.shape, strict=True))
         values = np.atleast_1d(np.asarray(given.window_sizes, dtype=np.float64))
         is_inside = values.min() >= shortest * (1 - 1e-9) and values.max() <= longest * (1 + 1e-9)
         expected = f"lengths from {shortest:.3g} m (a spacing) to {longest:.3g} m (the surface)"

@@ -417,10 +417,8 @@ def _is_beside(
     cycles: Array, other: Array, shape: tuple[int, ...], apart: float = _TAPER_REACH + 0.5
 ) -> bool:
     """Return whether two waves, as they are or one of them reversed, are nearer than some modes."""
-    return any(
-        float(np.max(np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape)) < apart
-        for sign in (1.0, -1.0)
-    )
+    distances = (np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape for sign in (1.0, -1.0))
+    return any(float(np.max(distance)) < apart for distance in distances)
 
 
 def _mean_square_increment(heights: Array) -> float:

@@ -202,6 +202,7 @@ DEFECTS = {
     "interpolated": (interpolated, "interpolated"),
     "median filter": (lambda z: median_filter(z, 3), "medians"),
     "lowest missing": (lambda z: np.where(z < np.quantile(z, 0.1), np.nan, z), "low heights are missing"),
+    "product": (lambda z: np.outer(z[:, 0], z[0]), "product of a profile"),
 }
 
 
