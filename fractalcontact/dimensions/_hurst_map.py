@@ -144,7 +144,7 @@ def hurst_map(
     length = 0.5 * window if step is None else min(float(step), max(grid.extent))
     steps = [max(1, int(nearest_whole(length / spacing))) for spacing in grid.spacing]
     along_axes = zip(grid.shape, edges, steps, strict=True)
-    rows, columns = (np.arange(0, n - edge + 1, step) for n, edge, step in along_axes)
+    rows, columns = (np.arange(0, n - edge + 1, jump) for n, edge, jump in along_axes)
     windows = _Windows((edges[0], edges[1]), rows, columns, steps)
     leading = surface.dims[:-2]
     records: list[Estimate] = []

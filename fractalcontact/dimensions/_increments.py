@@ -226,7 +226,8 @@ def increment_moments(slabs: Iterable[tuple[Array, int]], shape: tuple[int, ...]
         blocks = (_ratio(block_sums, block_counts), block_counts)
     observed = None
     if any(mask is not None for mask in masks):
-        pairs, nx = zip(masks, row_sums, strict=True), shape[-1]
+        nx = shape[-1]
+        pairs = zip(masks, row_sums, strict=True)
         seen = [np.ones((len(sums), nx), dtype=bool) if mask is None else mask for mask, sums in pairs]
         observed = np.concatenate(seen)
     return Moments(_ratio(total, number), number, shape, stride, observed, blocks)

@@ -249,7 +249,7 @@ def count_boxes_in_bands(
     Zeros to work in, of the band and, where it is cut in y, of it with its neighbours: `summed_rows` (2, 2),
     the range of rows that are summed, `columns` (3, nx), their cells of the set in each column (and, last,
     none), and `prefix` (2, nx + 1), how many columns left of each position hold any, or hold more than in the
-    band; a periodic x is continued. `numpy.zeros` in a kernel takes .3 s to compile.
+    band. What is longer in `prefix` continues a periodic x.
     """
     ny, nx = mask.shape
     ahead = np.uint32(size)  # unsigned: no test for negative indices

@@ -250,7 +250,7 @@ def amount(data: Any, scale: Scale | None = None) -> str:
     """
     units = units_of(data.name, data.attrs)
     values = without_rounding(data.values, units)
-    finite_values = values[np.isfinite(values)]
+    finite_values = finite(values)
     if str(data.name) in FRACTIONS:
         scale = Scale(0.01, "%")
     elif scale is None:
@@ -288,7 +288,7 @@ def _over_members(
     `text` writes a single value; `decimals` gives those of the mean and of the deviation from the deviation.
     """
     values = np.asarray(values, dtype=float)
-    finite_values = values[np.isfinite(values)]
+    finite_values = finite(values)
     if finite_values.size == 0:
         return "-"
     share = share_of(finite_values.size, values.size)
@@ -318,8 +318,8 @@ def at_value(name: str, dim: str, value: Any) -> Any:
 
 
 def finite(data: Any) -> Array:
-    """Return the finite values."""
-    values = np.asarray(data.values, dtype=float)
+    """Return the finite values of an array."""
+    values = np.asarray(data, dtype=float)
     return np.asarray(values[np.isfinite(values)])
 
 
