@@ -96,7 +96,8 @@ class Operator:
 class PeriodicOperator(Operator):
     """Periodic body: 2/|q| times the modes of the pressure (Stanley and Kato 1997), without the mean.
 
-    With a stiffness of the mean it is the inverse, |q|/2. It needs no table of |q|, another array.
+    With a stiffness of the mean it is the inverse, |q|/2. A small plane has a table of |q|; a large one needs
+    no such further array.
     """
 
     def __init__(
