@@ -1,8 +1,8 @@
 """Influence coefficients: the displacement of one node under a unit force on another.
 
-Everything here is for a contact modulus of 1, so a coefficient is in 1/m. Sources: Boussinesq (1885); Love
-(1929, Phil. Trans. A 228:377) for the rectangle; Sneddon (1946) for the plate; the lattice sums are those of
-Epstein (1903), summed after Ewald (1921).
+Everything here is for a contact modulus of 1: force (N) times coefficient (1/m) over E* (Pa) is the
+displacement (m). Sources: Boussinesq (1885); Love (1929, Phil. Trans. A 228:377) for the rectangle; Sneddon
+(1946) for the plate; the lattice sums are those of Epstein (1903), summed after Ewald (1921).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ DISC_RADII = ("second_order", "inscribed", "equal_area")
 def disc_coefficients(shape: tuple[int, int], spacing: tuple[float, float], radius: float) -> Array:
     """Return the displacement at node (i, j) under a unit force on a rigid circular plate at (0, 0).
 
-    For radius a it is 1/(2a) at the plate itself and asin(a/r)/(pi a) away from it. Shape (ny, nx), 1/m for a
-    modulus of 1.
+    It is that of the surface at the point of the node, at the distance r from the centre of the plate: for
+    a radius a it is asin(a/r)/(pi a), and 1/(2a) on the plate itself. Shape (ny, nx), 1/m for a modulus of 1.
     """
     distance = np.hypot(np.arange(shape[0])[:, None] * spacing[0], np.arange(shape[1])[None, :] * spacing[1])
     distance[0, 0] = 1.0

@@ -152,7 +152,10 @@ class Step:
 
     @property
     def stiffness(self) -> float:
-        """Force over closure of a punch, N/m: infinite in full contact of a periodic body."""
+        """Force over closure of a step of `press_punch`, N/m: infinite in full contact of a periodic body.
+
+        As the base of the punch is flat and stays, this is the derivative; of any other step it is a secant.
+        """
         return self.force / self.closure if self.closure > 0 else math.inf
 
     @property

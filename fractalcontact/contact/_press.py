@@ -96,7 +96,7 @@ def press(
     disc_radius : {"second_order", "inscribed", "equal_area"}
         Radius of the plates. "second_order" makes the error quadratic in the spacing.
     hardness : float, optional
-        Largest pressure (Pa). Where it is reached the surface yields, and the overlap stays as indentation.
+        Largest pressure H (Pa). Gap = 0 where 0 < p < H; where p = H the overlap stays as indentation.
     tolerance : float
         Bound on `residual`, the scale-free optimality error.
     method : {"fast", "elimination"}

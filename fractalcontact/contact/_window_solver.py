@@ -156,9 +156,11 @@ class WindowSolver:
             return None
         first, last = self.past_steps[0], self.past_steps[-1]
         if first.control != last.control:
+            # how far ahead in the log of the control, the step from `first` to `last` as the unit
             steps = np.log(control.value / last.control) / np.log(last.control / first.control)
             if abs(steps) <= max_steps:
                 return np.asarray(np.maximum(last.state + steps * (last.state - first.state), 0.0))
+        # one step before, or too far from it: its pressure in proportion to the control
         return np.asarray(np.maximum(last.state, 0.0) * (control.value / last.control))
 
     def extrapolated_closure(
