@@ -41,7 +41,7 @@ def _check(problems: Problems) -> JointProblem | None:
     check=_check,
     memory=PRESS_BYTES,
 )
-@takes_checked
+@takes_checked  # `problem` is what `_check` returns; it is no argument of the caller
 def closure(
     problem: JointProblem,
     /,
@@ -63,9 +63,10 @@ def closure(
 ) -> xr.Dataset:
     """Return the closure of a sheared crack under a path of load.
 
-    The delta-surface of every shear is pressed together along the same path. The closure w counts from first
-    touch at that shear. Without its bulk part, w_int = w - w_b(F), it is 0 to rounding for mated faces, where
-    `bulk` is "flat_block" and no node yields.
+    Two elastic half-spaces approach without tilt, with the delta-surface of every shear between them, along
+    the same path. The closure w counts from first touch at that shear, where the rigid dilatancy holds the
+    faces apart. Without its bulk part, w_int = w - w_b(F), it is 0 to rounding for mated faces, where `bulk`
+    is "flat_block" and no node yields.
 
     Parameters
     ----------
@@ -79,8 +80,9 @@ def closure(
         Exactly one of them: approach from first touch (m), force on the block (N), or force over its area
         (Pa). A sequence is a path of load, which may go up and down.
     bulk : {"flat_block", "uniform_pressure"}
-        Bulk part w_b: closure of the flat block, or its mean displacement under uniform pressure (about 9 %
-        more for a square). Zero for periodic bodies.
+        Bulk part w_b: closure under the same force of the flat block (flat faces of the same extent, which
+        touch everywhere), or its mean displacement under uniform pressure (about 9 % more for a square). Zero
+        for periodic bodies.
     keep : str or sequence of str
         Maps over (shear, step, y, x): "state", "pressure", "gap", "displacement", "residual_height".
     influence, disc_radius, hardness, tolerance, method

@@ -85,8 +85,8 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
         initial_stiffness Kni (Pa/m) and greatest_closure Vm (m, infinite for a straight line) of the
         hyperbola, with 95 % intervals (_low, _high); exponential_misfit and hyperbolic_misfit (m, rms);
         preferred_law (flags undecided, exponential, hyperbolic, neither) and law_score, positive for the
-        exponential. Over (..., step): stiffness dp/dw (Pa/m); with a seating pressure seated_closure (m), and
-        seating_pressure (Pa). NaN with the `reason` where nothing can be fitted.
+        exponential. Over (..., step): stiffness dp/dw of the interface (Pa/m); with a seating pressure
+        seated_closure (m), and seating_pressure (Pa). NaN with the `reason` where nothing can be fitted.
 
     Raises
     ------
@@ -101,6 +101,9 @@ def closure_laws(closure: xr.Dataset, *, seating_pressure: float | None = None) 
     intervals (linear regression, Fieller, profile of the sum of squares) take the residuals of the steps for
     independent: they hold the scatter about a law, not its truth. law_score is the test of Vuong (1989) of
     laws with equal numbers of parameters. A law that scatters by over 5 % of the range is not preferred.
+
+    w is the closure of the interface. A test across the block measures a lower stiffness K, for the bodies
+    are compressed too: 1/K = 1/stiffness + bulk_closure/nominal_pressure.
 
     The stiffness, along each branch of the path, is of third order in unequal steps: see page
     `theory_joints`, also for its errors on the shipped cracks, where few cells touch.

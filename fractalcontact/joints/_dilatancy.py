@@ -80,6 +80,8 @@ def dilatancy(
         rigid dilatancy, and no contact is solved.
     normal_stiffness : float, optional
         Stiffness k of the spring per nominal area, Pa/m; `normal_force` is then N0. None: constant force.
+        The dilatancy leaves out the bulk of both bodies, so that 1/k has to include it: 1/k_s + A/k_b, with
+        k_s of what loads the block from outside and k_b of `contact.flat_stiffness`.
     pressed : Dataset, optional
         A result of `closure` for the same crack and options: the shears at which it holds all the forces
         (with a hardness: the path of the forces) are taken from it, the others pressed. Not with `keep` or

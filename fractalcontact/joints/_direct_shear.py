@@ -143,7 +143,8 @@ def direct_shear(
     direction : str or float
         Compass word, or degrees anticlockwise from E, along which whole cells lie.
     normal_stiffness : float, optional
-        Stiffness of a spring on the block per area, Pa/m. Default: constant normal stress.
+        Stiffness of a spring on the block per area, Pa/m, whose compliance includes the bulk of both bodies,
+        as in `dilatancy`. Default: constant normal stress.
     shear_stiffness : float, optional
         Elastic shear stiffness per area, Pa/m. Default: 2 (1 - nu)/(2 - nu) times the normal stiffness of
         unloading after the first step.
