@@ -2,7 +2,9 @@
 
 Tests of what all functions have in common take it from here: labels, files, coordinates of the user's own,
 wrong arguments, missing numbers, threads and processes, damaged arguments. A new function needs one line in
-`CALLS`, unless it needs `SAMPLES` alone, or is a kind of figure with the name of a function.
+`CALLS`, unless `SAMPLES` has all its arguments without a default, or it is a kind of figure with the name of
+a function. A line with further arguments makes the sample as `SAMPLES` does: `{"mask": pressed()["state"],
+"size": 3}`.
 """
 
 import functools

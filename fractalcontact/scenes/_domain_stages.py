@@ -108,7 +108,7 @@ def _evolution_remarks(tree: xr.DataTree, data: xr.Dataset) -> Iterator[str]:
 
 
 SIGNATURE = "domains/signature"
-OVER = ("shear", "step")  # a table has rows over the shears, or over the load
+OVER = ("shear", "step")  # a table has rows over the shears, each under the last load, or over the load
 
 
 def _domain(

@@ -64,12 +64,12 @@ class Rows:
     title : str
     over : tuple of str
         The dims along which it has rows, of those that the result has; "step" is the path of the load.
-        Other paths of loads and shears are shown at their end.
+        Other paths of loads and shears are shown at their end: a row of a shear under the last load.
     columns : tuple of Column
     remarks : function
         What a reader of the whole table needs to know.
     first_dim : bool
-        Rows along the first of the dims alone.
+        Rows along the first of the dims alone: over ("shear", "step") a row is a shear, under the last load.
     load : str
         The variable that names a step; default the nominal pressure.
     """
