@@ -47,7 +47,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     decay,
     posterior,
 )
-from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
+from fractalcontact.dimensions._surface_input import Scales, between
 
 LARGEST = 2048  # points along each axis: 5 s of processor time and .8 GB
 LARGEST_SPACINGS = 32.0  # ratio of the spacings: images are summed as far along both axes
@@ -219,9 +219,8 @@ class Classes:
         """
         mean, freedom = after.mean(axis=0), len(after) / (len(after) - 1.0)
         scatter = freedom * self.count * np.mean(np.square(after / mean - 1.0), axis=0)
-        self.level = self.level / (mean / before.mean(axis=0))
-        by_ring = np.maximum(1.0, self.by_ring(scatter, np.ones(mean.size)))
-        self.information = self.information / by_ring[self.ring]
+        self.level /= mean / before.mean(axis=0)
+        self.information /= np.maximum(1.0, self.by_ring(scatter, np.ones(mean.size)))[self.ring]
 
     @cached_property
     def _before(self) -> Array:
@@ -415,14 +414,11 @@ def fit_azimuths(
     None if they are too few, if their lengths differ by less than `least_log_ratio`, or the spacings by more
     than `LARGEST_SPACINGS`. `scales`: wavelengths that count, in x spacings.
     """
-    middle = middle_slices(first.heights.shape, LARGEST)
-    observed, heights = np.isfinite(first.heights[middle]), first.filled[middle]
-    dy = first.lattice.spacing[0]
+    first, dy = first.middle(LARGEST), first.lattice.spacing[0]
     if max(dy, 1.0 / dy) > LARGEST_SPACINGS:
         return None
-    is_periodic = first.lattice.periodic and heights.shape == first.heights.shape
-    modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_periodic)
-    power = modes.power(heights)
+    modes = PlaneModes(first.lattice.shape, dy, first.lattice.periodic)
+    power = modes.power(first.filled)
     low, high = (0.0, np.inf) if scales is None else scales
     band = max(low, _shortest(modes, power)), high
 
@@ -431,7 +427,7 @@ def fit_azimuths(
         if classes.places.size < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
             return None
         if first.filling is not None:
-            classes.corrected(*_filled_levels(classes, observed))
+            classes.corrected(*_filled_levels(classes, first.filling))
         return classes
 
     def most_probable(
@@ -454,9 +450,11 @@ def fit_azimuths(
         found = replace(found, share=share / share.sum())
         return bins, found, *max(fits, key=lambda fit: float(found.share[fit[3]].sum()))[:2]
 
-    start = None if first.filling is None else first.modes
-    theta, form = (first.theta, first.form) if start is None else (start.theta, start.form)
-    spectrum = MetricSpectrum(theta, form, first.log_ratio, dy)
+    # beside gaps the corrected spectrum of a part starts nearer to the end
+    part = first.middle(LARGEST // 8)
+    observed = part if np.isfinite(part.heights).mean() > 0.5 else first
+    start = (None if first.filling is None else observed.modes) or first
+    spectrum = MetricSpectrum(start.theta, start.form, first.log_ratio, dy)
     nearest = math.inf
     for _ in range(_ROUNDS // 3):  # of 200 surfaces under a lay 199 settled in 1 to 4, one not in 12
         classes = classes_of(spectrum)
@@ -486,15 +484,15 @@ def fit_azimuths(
     return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values)
 
 
-def _filled_levels(classes: Classes, observed: Array) -> tuple[Array, Array]:
+def _filled_levels(classes: Classes, filling: Filling) -> tuple[Array, Array]:
     """Return the levels of Gaussian surfaces with the spectrum of the classes before and after filling."""
-    stream, modes, filling = np.random.default_rng(1), classes.modes, Filling(observed)
-    ny, nx = observed.shape
+    stream, modes = np.random.default_rng(1), classes.modes
+    ny, nx = filling.observed.shape
     y, x = half_wavenumbers((2 * ny, 2 * nx), (modes.dy, 1.0))
     root = np.sqrt(classes.spectrum.with_noise(y[:, None], x))
     root[0, 0] = 0.0
     levels: list[list[Array]] = []
-    for _ in range(2):
+    for _ in range(1 if ny * nx > 1 << 17 else 2):  # of four surfaces each
         white = fft.rfft2(stream.standard_normal((2 * ny, 2 * nx)))
         heights = fft.irfft2(white * root, (2 * ny, 2 * nx), overwrite=True)
         parts = heights[:ny, :nx], heights[ny:, nx:], heights[:ny, nx:], heights[ny:, :nx]

@@ -217,9 +217,8 @@ def _missing_extremes(heights: Array, edge: int = 15) -> str:
     z = float(means.mean() / (means.std(ddof=1) / np.sqrt(numbers.size)))
     if not abs(z) > _DEVIATIONS:
         return ""
-    which = "low" if z < 0 else "high"
+    which, side = ("low", "below") if z < 0 else ("high", "above")
     return (
-        f"{which} heights are missing: those beside gaps lie {abs(z):.1f} standard deviations "
-        f"{'below' if z < 0 else 'above'} their surroundings; scan again with a larger range, or crop to a "
-        "complete part"
+        f"{which} heights are missing: those beside gaps lie {abs(z):.1f} standard deviations {side} their "
+        "surroundings; scan again with a larger range, or crop to a complete part"
     )

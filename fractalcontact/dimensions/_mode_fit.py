@@ -92,6 +92,17 @@ class FirstFit:
     log_ratio: Array
     is_oblique: bool
 
+    def middle(self, edge: int) -> FirstFit:
+        """Return the same fit, with the middle `edge` points along each axis, or with all of fewer."""
+        part = middle_slices(self.heights.shape, edge)
+        heights = self.heights[part]
+        if heights.size == self.heights.size:
+            return self
+        observed = np.isfinite(heights)
+        filling = None if observed.all() else Filling(observed)
+        lattice = replace(self.lattice, shape=observed.shape, periodic=False)
+        return replace(self, heights=heights, filled=self.filled[part], filling=filling, lattice=lattice)
+
     @cached_property
     def modes(self) -> ModeFit | None:
         """Cosine modes, or Fourier modes of a periodic surface; None if too few count.
