@@ -24,12 +24,13 @@ import numpy as np
 from fractalcontact.base import fft
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.spectra import half_wavenumbers
-from fractalcontact.dimensions._gaussian_mixture import Bins, alias_logs, mixture, spread_nodes
+from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, alias_logs, mixture, spread_nodes
 from fractalcontact.dimensions._metric_spectrum import LARGEST_LOG_RATIO, MetricSpectrum, gaussian_tables
 from fractalcontact.dimensions._mode_bins import (
     LEAST,
     LEAST_BINS,
     PER_OCTAVE,
+    SETTLED,
     Filling,
     clear_modes,
     joined_classes,
@@ -47,7 +48,7 @@ from fractalcontact.dimensions._spectral_posterior import (
     decay,
     posterior,
 )
-from fractalcontact.dimensions._surface_input import Scales, between
+from fractalcontact.dimensions._surface_input import Scales, between, middle_slices
 
 LARGEST = 2048  # points along each axis: 5 s of processor time and .8 GB
 LARGEST_SPACINGS = 32.0  # ratio of the spacings: images are summed as far along both axes
@@ -196,6 +197,7 @@ class Classes:
         self.ring, self.sector = np.divmod(present, SECTORS)
         self.count = np.bincount(self.number).astype(float)
         self.information = np.full(self.count.shape, modes.information)
+        self.correction = np.ones(self.count.shape)
         self.level = self.means(power)
         self.lnq = np.bincount(self.number, lnq) / self.count
         # some modes of each class, evenly by their wavenumber
@@ -219,7 +221,8 @@ class Classes:
         """
         mean, freedom = after.mean(axis=0), len(after) / (len(after) - 1.0)
         scatter = freedom * self.count * np.mean(np.square(after / mean - 1.0), axis=0)
-        self.level /= mean / before.mean(axis=0)
+        self.correction = mean / before.mean(axis=0)
+        self.level /= self.correction
         self.information /= np.maximum(1.0, self.by_ring(scatter, np.ones(mean.size)))[self.ring]
 
     @cached_property
@@ -414,11 +417,14 @@ def fit_azimuths(
     None if they are too few, if their lengths differ by less than `least_log_ratio`, or the spacings by more
     than `LARGEST_SPACINGS`. `scales`: wavelengths that count, in x spacings.
     """
-    first, dy = first.middle(LARGEST), first.lattice.spacing[0]
+    middle = middle_slices(first.heights.shape, LARGEST)
+    observed, heights = np.isfinite(first.heights[middle]), first.filled[middle]
+    dy = first.lattice.spacing[0]
     if max(dy, 1.0 / dy) > LARGEST_SPACINGS:
         return None
-    modes = PlaneModes(first.lattice.shape, dy, first.lattice.periodic)
-    power = modes.power(first.filled)
+    is_periodic = first.lattice.periodic and heights.shape == first.heights.shape
+    modes = PlaneModes((heights.shape[0], heights.shape[1]), dy, is_periodic)
+    power = modes.power(heights)
     low, high = (0.0, np.inf) if scales is None else scales
     band = max(low, _shortest(modes, power)), high
 
@@ -427,7 +433,7 @@ def fit_azimuths(
         if classes.places.size < LEAST * LEAST_BINS or classes.rings < LEAST_BINS:
             return None
         if first.filling is not None:
-            classes.corrected(*_filled_levels(classes, first.filling))
+            classes.corrected(*_filled_levels(classes, observed))
         return classes
 
     def most_probable(
@@ -450,13 +456,12 @@ def fit_azimuths(
         found = replace(found, share=share / share.sum())
         return bins, found, *max(fits, key=lambda fit: float(found.share[fit[3]].sum()))[:2]
 
-    # beside gaps the corrected spectrum of a part starts nearer to the end
-    part = first.middle(LARGEST // 8)
-    observed = part if np.isfinite(part.heights).mean() > 0.5 else first
-    start = (None if first.filling is None else observed.modes) or first
-    spectrum = MetricSpectrum(start.theta, start.form, first.log_ratio, dy)
+    # what filling does to short waves looks like a blur until it is corrected
+    theta, form = (first.theta, first.form) if first.filling is None else (first.exact, ALIASED)
+    spectrum = MetricSpectrum(theta, form, first.log_ratio, dy)
     nearest = math.inf
-    for _ in range(_ROUNDS // 3):  # of 200 surfaces under a lay 199 settled in 1 to 4, one not in 12
+    # of 200 surfaces under a lay 199 settled in 1 to 4, one not in 12; beside gaps it may take longer
+    for _ in range(_ROUNDS if first.filling is not None else _ROUNDS // 3):
         classes = classes_of(spectrum)
         if classes is None:
             return None
@@ -467,6 +472,8 @@ def fit_azimuths(
         moved = math.hypot(*(spectrum.log_ratio - classes.spectrum.log_ratio))
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
         has_settled = moved < _SAME and np.ptp(change) < 0.7
+        effect = np.log(classes.by_ring(classes.correction, classes.count)) * (change - change.mean())
+        has_settled = has_settled and np.abs(effect).max() < SETTLED
         if has_settled or not moved >= nearest:  # the first one in any case
             nearest, result = moved, (classes, bins, found, spectrum, covariance)
         if has_settled:
@@ -484,10 +491,10 @@ def fit_azimuths(
     return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values)
 
 
-def _filled_levels(classes: Classes, filling: Filling) -> tuple[Array, Array]:
+def _filled_levels(classes: Classes, observed: Array) -> tuple[Array, Array]:
     """Return the levels of Gaussian surfaces with the spectrum of the classes before and after filling."""
-    stream, modes = np.random.default_rng(1), classes.modes
-    ny, nx = filling.observed.shape
+    stream, modes, filling = np.random.default_rng(1), classes.modes, Filling(observed)
+    ny, nx = observed.shape
     y, x = half_wavenumbers((2 * ny, 2 * nx), (modes.dy, 1.0))
     root = np.sqrt(classes.spectrum.with_noise(y[:, None], x))
     root[0, 0] = 0.0

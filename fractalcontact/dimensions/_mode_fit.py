@@ -79,6 +79,8 @@ class FirstFit:
         Components (u, v) of `metric_of`; the stretch of the lattice is exp(u).
     is_oblique : bool
         The lay is oblique to the axes: cosine modes do not know the sign of an azimuth.
+    exact : ndarray
+        Parameters without departures from an exact surface, but a known blur.
     """
 
     heights: Array
@@ -91,17 +93,7 @@ class FirstFit:
     form: int
     log_ratio: Array
     is_oblique: bool
-
-    def middle(self, edge: int) -> FirstFit:
-        """Return the same fit, with the middle `edge` points along each axis, or with all of fewer."""
-        part = middle_slices(self.heights.shape, edge)
-        heights = self.heights[part]
-        if heights.size == self.heights.size:
-            return self
-        observed = np.isfinite(heights)
-        filling = None if observed.all() else Filling(observed)
-        lattice = replace(self.lattice, shape=observed.shape, periodic=False)
-        return replace(self, heights=heights, filled=self.filled[part], filling=filling, lattice=lattice)
+    exact: Array
 
     @cached_property
     def modes(self) -> ModeFit | None:
@@ -221,16 +213,16 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     y, x = torus.wavenumbers
     pilot = np.hypot(y[:, None] / torus.stretch, x) ** (-1.0 - torus.axes)
     bins = make_bins(torus, power, pilot, keep, is_tapered=information == TAPERED, is_pilot=True)
-    hypothesis, _, theta = posterior(bins, Known(spread), is_pilot=True).most_probable
+    found = posterior(bins, Known(spread), is_pilot=True)
+    hypothesis, _, theta = found.most_probable
     # levels follow the log ratio times the slope, which was assumed
     of_slope = 0.5 * (1.0 + torus.axes) / (1.0 + theta[HURST])
     shrunk *= min(of_slope, LARGEST_LOG_RATIO / max(math.hypot(*shrunk), 1e-300))
     is_off_axes = bool(uv[1] ** 2 > float(chdtri(1, FALSE_ALARM)) * variance[1, 1])
     is_oblique = is_off_axes and not lattice.periodic and of_slope * math.hypot(*uv) > NEAR_ISOTROPY
     lattice = replace(lattice, stretch=torus.stretch)
-    return FirstFit(
-        heights, filled, filling, scale, lattice, spread, theta, hypothesis.form, shrunk, is_oblique
-    )
+    known = heights, filled, filling, scale, lattice, spread
+    return FirstFit(*known, theta, hypothesis.form, shrunk, is_oblique, exact=found.peak(0)[2])
 
 
 def _tapered(heights: Array, lattice: Lattice, observed: Array) -> tuple[Lattice, Array]:
