@@ -471,9 +471,8 @@ def fit_azimuths(
         bins, found, spectrum, covariance = most_probable(classes, spectrum)
         moved = math.hypot(*(spectrum.log_ratio - classes.spectrum.log_ratio))
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
-        has_settled = moved < _SAME and np.ptp(change) < 0.7
         effect = np.log(classes.by_ring(classes.correction, classes.count)) * (change - change.mean())
-        has_settled = has_settled and np.abs(effect).max() < SETTLED
+        has_settled = moved < _SAME and np.ptp(change) < 0.7 and np.abs(effect).max() < SETTLED
         if has_settled or not moved >= nearest:  # the first one in any case
             nearest, result = moved, (classes, bins, found, spectrum, covariance)
         if has_settled:

@@ -187,9 +187,8 @@ def _product(heights: Array, lines: int = 32, share: float = 0.9999) -> str:
     if min(bends.shape) < lines - 1 or not np.isfinite(bends.sum()):
         return ""
     squares = np.square(np.linalg.svd(bends, compute_uv=False))
-    if not squares[0] > share * squares.sum():
-        return ""
-    return "the heights are a product of a profile along x and one along y: estimate a row and a column alone"
+    text = "the heights are a product of a profile along x and one along y: estimate a row and a column alone"
+    return text if squares[0] > share * squares.sum() else ""
 
 
 def _missing_extremes(heights: Array, edge: int = 15) -> str:

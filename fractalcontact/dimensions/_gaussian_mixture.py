@@ -16,7 +16,7 @@ which sampling (aliases), free edges, unequal spacings and the blur are exact. A
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -361,6 +361,8 @@ class Lattice:
         Lag along x over that along y of equal increments, without a blur.
     columns : ndarray of int, optional
         Modes of a profile that are used. Default: all.
+    leaks : ndarray, optional
+        What free ends add to the densities of these modes: of the Gaussians of `_free_ends`.
     """
 
     shape: tuple[int, int]
@@ -368,6 +370,7 @@ class Lattice:
     periodic: bool = False
     stretch: float = 1.0
     columns: Array | None = None
+    leaks: Array | None = None
 
     @property
     def axes(self) -> int:
@@ -455,11 +458,11 @@ class Lattice:
         if not edges:
             return [aliased, *others]
         wider = 1.0 + 4.0 * line.t * s**2
-        if self.columns is None:
+        if self.leaks is None:
             power = free_power(n, line.t / wider, self.axes == 1) / np.sqrt(wider)[:, None]
         else:
-            first, share, _ = _cubic(_NODES * (np.log2(self.t / self.t[0] / wider) + 1.0), len(self._leaks))
-            leaks = self._leaks[first[:, None] + np.arange(4)]
+            first, share, _ = _cubic(_NODES * (np.log2(self.t / self.t[0] / wider) + 1.0), len(self.leaks))
+            leaks = self.leaks[first[:, None] + np.arange(4)]
             leak = np.einsum("tk,tkq->tq", share / np.sqrt(wider)[:, None], leaks)
             power = np.maximum(aliased + leak, 0.0)
         # the edges feel long waves alone, which are alike in all forms
@@ -467,15 +470,21 @@ class Lattice:
         return [power, *(np.maximum(leak + clean, least) for clean in others)]
 
     @cached_property
-    def _leaks(self) -> Array:
-        """What free ends add to the densities along x of some Gaussians an octave: of these, without a blur,
-        or of narrower ones with one.
+    def _free_ends(self) -> tuple[Array, Array]:
+        """Scales of some Gaussians an octave, of these without a blur or of narrower ones with one, and the
+        power of the modes of free ends of each.
         """
         t = self.t[0] * 2.0 ** np.arange(-1.0, np.log2(self.t[-1] / self.t[0]) + 1.0, 1.0 / _NODES)
-        n, q = self.shape[1], self.wavenumbers[1]
         # each by itself: less memory
-        leaks = [free_power(n, s, True)[0, self.columns] - AxisModes(s, q).sampled[0] for s in t[:, None]]
-        return np.array(leaks)
+        return t, np.array([free_power(self.shape[1], s, True)[0] for s in t[:, None]])
+
+    def with_columns(self, columns: Array) -> Lattice:
+        """Return the same lattice of some of the modes of a profile."""
+        chosen = replace(self, columns=columns)
+        if self.periodic:
+            return chosen
+        t, power = self._free_ends
+        return replace(chosen, leaks=power[:, columns] - AxisModes(t, chosen.wavenumbers[1]).sampled)
 
     def power(self, heights: Array) -> Array:
         """Return the squared modes of complete heights."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -263,7 +263,7 @@ def make_bins(
     ends = np.cumsum(np.bincount(bins))
     if lattice.axes == 1:
         some, columns = np.unique(columns, return_inverse=True)
-        lattice = replace(lattice, columns=some)
+        lattice = lattice.with_columns(some)
     spreads, nodes = lattice.spread_nodes(is_pilot=is_pilot)
     tables = np.zeros((FORMS, spreads.size, count.size, lattice.t.size))
     for k, spread in enumerate(spreads):

@@ -140,7 +140,7 @@ class FirstFit:
                 form = hypothesis.form
             # below `SETTLED` up to a factor of 1.2
             stretched = abs(math.log(stretch / lattice.stretch)) / 6.0
-            lattice = replace(lattice, stretch=stretch)
+            lattice = lattice if stretch == lattice.stretch else replace(lattice, stretch=stretch)
             before, pilot = pilot, expected_power(lattice, theta, form)
             change = np.log(pilot / before)
             change = (change - change[keep].mean()) * np.log(correction)
@@ -188,10 +188,9 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     heights = _without_rim(surface.heights)
     observed = np.isfinite(heights)
     filling = None if observed.all() else Filling(observed)
-    shape = heights.shape[0], heights.shape[1]
-    if min(shape[-surface.axes :]) < 4:
+    if min(heights.shape[-surface.axes :]) < 4:
         return None
-    lattice = Lattice(shape, surface.plane_spacing, all(surface.grid.periodic) and filling is None)
+    lattice = Lattice(observed.shape, surface.plane_spacing, all(surface.grid.periodic) and filling is None)
     if lattice.periodic:
         heights = heights - heights[observed].mean()
     else:
