@@ -338,7 +338,7 @@ class Filling:
     def _means(self, sums: Array, level: int = 0, sweeps: int = 4) -> Array:
         """Return sums over weights; where there are none, what the sums of 2 x 2 points fill in."""
         weight, y, x = self.levels[level]
-        mean = np.asarray(sums / weight)
+        mean = np.ascontiguousarray(sums / weight)  # `ravel` is a view
         if level + 1 == len(self.levels):
             return mean
         coarse = self._means(_halved(sums), level + 1)

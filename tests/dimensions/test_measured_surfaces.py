@@ -100,6 +100,12 @@ def test_interval_holds_the_exponent(kind, hurst):
     assert low <= float(result.hurst) <= high
 
 
+def test_gaps_do_not_depend_on_the_order_in_memory():
+    heights = with_gaps(brownian(0.7, 5, n=64), "points", 5)
+    by_rows, by_columns = (estimated(order(heights)).hurst for order in (np.asarray, np.asfortranarray))
+    assert float(by_columns) == pytest.approx(float(by_rows), abs=1e-9)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_coverage(kind):
