@@ -180,8 +180,8 @@ def _sets(found: Sequence[Wave], shape: tuple[int, ...], highest: int = 24) -> l
     """
     left, sets = sorted(found, key=lambda wave: -wave.wavelength), []
     while left:
-        places = [k * left[0].cycles for k in range(1, highest + 1)]
-        members = [wave for wave in left if any(_is_beside(wave.cycles, at, shape, 1.0) for at in places)]
+        multiples = np.outer(np.arange(1.0, highest + 1.0), left[0].cycles)
+        members = [wave for wave in left if _is_beside(wave.cycles, multiples, shape, 1.0)]
         left = [wave for wave in left if wave not in members]
         sets.append(members)
     return sorted(sets, key=lambda members: -max(wave.amplitude for wave in members))
@@ -315,7 +315,7 @@ class Search:
         for place in np.argsort(-power[rows, columns]):
             row, column = rows[place], columns[place]
             cycles = np.array([y[row], x[column]])
-            if not any(_is_beside(cycles, other, heights.shape) for other, _ in found):
+            if not _is_beside(cycles, np.reshape([other for other, _ in found], (-1, 2)), heights.shape):
                 p_value = float(self.number[row, column] * np.exp(-tail[row, column]))
                 found.append((cycles, p_value))
         return found
@@ -416,9 +416,9 @@ def _line_level(ratio: Array, rows: Array, columns: Array, outlying: float = 8.0
 def _is_beside(
     cycles: Array, other: Array, shape: tuple[int, ...], apart: float = _TAPER_REACH + 0.5
 ) -> bool:
-    """Return whether two waves, as they are or one of them reversed, are nearer than some modes."""
+    """Return whether a wave, as it is or reversed, is nearer than some modes to one of some others."""
     distances = (np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape for sign in (1.0, -1.0))
-    return any(float(np.max(distance)) < apart for distance in distances)
+    return any(float(distance.max(axis=-1).min(initial=np.inf)) < apart for distance in distances)
 
 
 def _mean_square_increment(heights: Array) -> float:
