@@ -43,9 +43,7 @@ _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free: the interval is for "
     "another kind of surface; see fractalcontact.surfaces.fill"
 )
-NO_MODES = (
-    "too few modes that vary along both axes: give more points, or a profile where heights vary along one"
-)
+NO_MODES = "too few modes count: give more points, or a profile where heights vary along one axis alone"
 
 
 def too_few_modes(scales: Scales) -> str:
@@ -109,9 +107,9 @@ def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -
     keep = fit.keep & between(2.0 * np.pi / fit.lattice.q, window)
     number, least = int(np.count_nonzero(keep)), LEAST * LEAST_BINS
     if number < least:
-        if window is None and keep.size > 4 * least:
+        if window is None and not fit.lattice.periodic and keep.size > 4 * least:
             return smooth()
-        which = "in the window of scales" if window else "that the edges of the surface do not dominate"
+        which = "in the window of scales" if window else "beside those of edges, filters, waves or rounding"
         return undefined(f"{number} modes {which}, at least {least} are needed")
     if np.sum(fit.information * keep) < LEAST:  # a mode of a surface with gaps tells less
         return undefined(NO_MODES)

@@ -174,3 +174,11 @@ def test_few_points_of_a_large_map_leave_no_exponent(points, missing, is_known):
     found = fc.dimensions.estimate(heights.where(np.random.default_rng(2).random(heights.shape) > missing))
     assert np.isfinite(found.ci_low.item()) == is_known
     assert ("too few modes" in found.reason.item()) != is_known
+
+
+def test_few_waves_of_a_periodic_surface_are_not_laid_to_its_edges():
+    y, x = 2.0 * np.pi * np.indices((64, 64)) / 64
+    heights = 1e-6 * (np.cos(5 * x + 3 * y) + np.cos(9 * x - 7 * y) + np.cos(2 * x + 11 * y))
+    found = fc.dimensions.estimate(fc.surfaces.from_array(heights, 1e-4, periodic=True)).isel(method=0)
+    assert np.isnan(float(found.hurst))
+    assert "modes beside those of edges, filters, waves or rounding" in found.reason.item()
