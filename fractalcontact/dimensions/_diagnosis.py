@@ -144,7 +144,7 @@ def _spikes(heights: Array, size: int = 1 << 20, spike: float = 20.0) -> str:
         return ""
     return (
         f"{number} heights stand out of their neighbours by more than {spike:.0f} standard deviations: "
-        "spikes or steps; see fractalcontact.surfaces.despike"
+        "spikes, steps or rougher patches; see fractalcontact.surfaces.despike"
     )
 
 
