@@ -153,7 +153,7 @@ def _record(surface: Surface, octaves: _Octaves) -> _Record:
     fit = None if first is None else first.modes
     if fit is None or not fit.keep.any():
         return _Record(fits, none, none > 0, (math.nan,) * len(_OF_WINDOW), "")
-    bins = fit.bins()
+    bins = fit.bins(fit.keep)
     owner, mode_owner = octaves.index(bins.lnq), octaves.index(np.log(fit.lattice.q[fit.keep]))
     modes = np.bincount(mode_owner, minlength=octaves.number)
     is_there = (modes >= _LEAST_MODES) & (np.bincount(owner, minlength=octaves.number) >= _LEAST_BINS)

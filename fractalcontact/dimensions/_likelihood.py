@@ -43,6 +43,7 @@ _PERIODIC_GAPS = (
     "a periodic surface with gaps, or with one periodic axis, is treated as free: the interval is for "
     "another kind of surface; see fractalcontact.surfaces.fill"
 )
+_MOSTLY_WAVES = "most of the power is in single waves: no random surface; see fractalcontact.dimensions.waves"
 NO_MODES = "too few modes count: give more points, or a profile where heights vary along one axis alone"
 
 
@@ -115,7 +116,8 @@ def _of_modes(surface: Surface, first: FirstFit, window: Scales, known: Known) -
         return undefined(NO_MODES)
     bins = replace(fit.bins(keep), noise=known.total_noise)
     found = posterior(bins, known, pilot_spread=float(fit.theta[SPREAD]))
-    return _estimate(surface, first, bins, found, known)
+    estimate = _estimate(surface, first, bins, found, known)
+    return estimate if estimate.reason or fit.waves < 0.5 else estimate.without_interval(_MOSTLY_WAVES)
 
 
 def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, known: Known) -> Estimate:
@@ -141,9 +143,8 @@ def _estimate(surface: Surface, first: FirstFit, bins: Bins, found: Posterior, k
         note=joined(*_findings(found, bins, dx, spread, height)),
         posterior=found,
     )
-    reason = diagnose(surface, is_window=known.is_window)
-    if any(surface.grid.periodic) and not first.lattice.periodic:
-        reason = _PERIODIC_GAPS
+    is_taken_as_free = any(surface.grid.periodic) and not first.lattice.periodic
+    reason = _PERIODIC_GAPS if is_taken_as_free else diagnose(surface, is_window=known.is_window)
     return estimate if not reason else estimate.without_interval(reason)
 
 

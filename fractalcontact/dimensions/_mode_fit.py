@@ -123,8 +123,8 @@ class FirstFit:
             keep &= power > EMPTY * pilot
             if not keep.any():
                 return None
-            ratio = whitened(lattice, power, pilot, keep)
-            keep &= ~single_waves(lattice, ratio, keep)
+            ratio, clear = whitened(lattice, power, pilot, keep), keep
+            keep = clear & ~single_waves(lattice, ratio, clear)
             levels = levels_by_azimuth(lattice, ratio, keep)
             level = lay(lattice, levels)
             if is_settled or not keep.any():  # of a narrow band single waves may be all
@@ -146,7 +146,8 @@ class FirstFit:
             change = (change - change[keep].mean()) * np.log(correction)
             is_settled = left == 2 or bool(max(stretched, np.abs(change[keep]).max()) < SETTLED)
         information = information / unevenness(self.heights)
-        return ModeFit(lattice, power / level, pilot, keep, information, theta, form)
+        waves = 1.0 - float(ratio[keep].sum() / ratio[clear].sum())
+        return ModeFit(lattice, power / level, pilot, keep, information, theta, form, waves)
 
 
 @dataclass(frozen=True)
@@ -165,6 +166,8 @@ class ModeFit:
     information : float or ndarray
     theta : ndarray
     form : int
+    waves : float
+        Share of the power over the pilot that is in single waves.
     """
 
     lattice: Lattice
@@ -174,11 +177,11 @@ class ModeFit:
     information: Array | float
     theta: Array
     form: int
+    waves: float
 
-    def bins(self, keep: Array | None = None) -> Bins:
-        """Return the bins of the modes that count, or of some of them."""
-        chosen = self.keep if keep is None else keep
-        return make_bins(self.lattice, self.power, self.pilot, chosen, information=self.information)
+    def bins(self, keep: Array) -> Bins:
+        """Return the bins of some of the modes."""
+        return make_bins(self.lattice, self.power, self.pilot, keep, information=self.information)
 
 
 def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:

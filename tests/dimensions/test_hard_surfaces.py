@@ -182,3 +182,11 @@ def test_few_waves_of_a_periodic_surface_are_not_laid_to_its_edges():
     found = fc.dimensions.estimate(fc.surfaces.from_array(heights, 1e-4, periodic=True)).isel(method=0)
     assert np.isnan(float(found.hurst))
     assert "modes beside those of edges, filters, waves or rounding" in found.reason.item()
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.85])
+def test_sums_of_waves_are_no_random_surface(hurst):
+    surface = fc.surfaces.weierstrass((96, 96), 1e-4, hurst=hurst, rms_height=1e-5, rng=1)
+    found = fc.dimensions.estimate(surface).isel(method=0)
+    assert np.isnan(float(found.ci_low))
+    assert found.reason.item().startswith("most of the power is in single waves")

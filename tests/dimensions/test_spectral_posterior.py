@@ -11,7 +11,8 @@ from fractalcontact.dimensions._surface_input import read_surfaces
 
 def bins_of(hurst, n=96, seed=1):
     surface = fc.surfaces.fbm((n, n), 1e-4, hurst=hurst, rms_increment=1e-6, rng=seed)
-    return first_fit(read_surfaces(surface)[0]).modes.bins()
+    fit = first_fit(read_surfaces(surface)[0]).modes
+    return fit.bins(fit.keep)
 
 
 def log_density(bins, theta, form=0):
