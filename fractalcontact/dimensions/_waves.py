@@ -31,6 +31,7 @@ SMALLEST = 16  # points along an axis
 LARGEST_CROP = 1024  # points along an axis of the part that is searched: a wave runs through all of it
 FALSE_ALARM = 1e-3  # probability of a wave in a surface that has none
 MOST = 32  # sets of marks, and searches; more are a pattern
+_HIGHEST = 24  # multiple that is named with its wave
 _LONGEST = {1: 7.0, 2: 4.0}  # least wavenumber tested, in steps, by number of axes: longer waves are the form
 _FIRST_RING = 2  # steps: longer waves are those of the trend
 _MARGIN = 12  # modes on either side of one that are compared with it
@@ -173,15 +174,12 @@ def _is_progression(found: Sequence[Wave], few: int) -> bool:
     return len(found) > few and bool(np.ptp(ratios) < 0.02 * ratios.mean())
 
 
-def _sets(found: Sequence[Wave], shape: tuple[int, ...], highest: int = 24) -> list[list[Wave]]:
-    """Sort waves by the one whose multiples they are, which comes first; the strongest set first.
-
-    Multiples up to the `highest` are named with their wave.
-    """
+def _sets(found: Sequence[Wave], shape: tuple[int, ...]) -> list[list[Wave]]:
+    """Sort waves by the one whose multiples they are, which comes first; the strongest set first."""
     left, sets = sorted(found, key=lambda wave: -wave.wavelength), []
     while left:
-        multiples = np.outer(np.arange(1.0, highest + 1.0), left[0].cycles)
-        members = [wave for wave in left if _is_beside(wave.cycles, multiples, shape, 1.0)]
+        multiples = np.outer(np.arange(1.0, _HIGHEST + 1.0), left[0].cycles)
+        members = [wave for wave in left if _beside(wave.cycles, multiples, shape, 1.0).any()]
         left = [wave for wave in left if wave not in members]
         sets.append(members)
     return sorted(sets, key=lambda members: -max(wave.amplitude for wave in members))
@@ -200,7 +198,7 @@ def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
     part = detrended(surface.heights[crop], 1, [is_periodic] * 2)[0]
     search = _search((part.shape[0], part.shape[1]), surface.plane_spacing, is_periodic)
     peaks = [] if surface.is_enlarged else search.peaks(part)
-    if not peaks:
+    if not 0 < len(peaks) <= MOST * _HIGHEST:
         return [], surface.heights
     rest = detrended(surface.heights, 1, [is_periodic] * 2)[0]
     part = rest[crop]  # a view: it changes with the rest
@@ -209,7 +207,8 @@ def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
         is_new = False
         for at, p_value in peaks:
             # what a wave has left of itself: it is fitted again
-            again = [wave for wave in found if _is_beside(at, wave.cycles, part.shape)]
+            near = _beside(at, [wave.cycles for wave in found], part.shape)
+            again = [found[k] for k in np.flatnonzero(near)]
             for wave in again:
                 rest += wave.heights(shape)
                 found.remove(wave)
@@ -221,11 +220,11 @@ def find_waves(surface: Surface) -> tuple[list[Wave], Array]:
             rest -= wave.heights(shape)
             found.append(wave)
             is_new |= not again
+        if len(_sets(found, shape)) > MOST:
+            return [], surface.heights
         peaks = search.peaks(part) if is_new else []
         if not peaks:
             break
-    if len(_sets(found, shape)) > MOST:
-        return [], surface.heights
     return sorted(found, key=lambda wave: -wave.amplitude), rest
 
 
@@ -310,14 +309,11 @@ class Search:
         limit = math.log(max(1, rows.size) / FALSE_ALARM)
         is_high[rows, columns] = _OF_LINE * np.log1p(above / _OF_LINE) > limit
         is_high &= power >= maximum_filter(power, self.gap, mode=("wrap", "nearest"))
-        rows, columns = np.nonzero(is_high)
         found: list[tuple[Array, float]] = []
-        for place in np.argsort(-power[rows, columns]):
-            row, column = rows[place], columns[place]
+        for row, column in np.argwhere(is_high)[np.argsort(-power[is_high])]:
             cycles = np.array([y[row], x[column]])
-            if not _is_beside(cycles, np.reshape([other for other, _ in found], (-1, 2)), heights.shape):
-                p_value = float(self.number[row, column] * np.exp(-tail[row, column]))
-                found.append((cycles, p_value))
+            if not _beside(cycles, [other for other, _ in found], heights.shape).any():
+                found.append((cycles, float(self.number[row, column] * np.exp(-tail[row, column]))))
         return found
 
     def _ratio(self, power: Array, rounding: float = 1e-14) -> Array:
@@ -413,12 +409,13 @@ def _line_level(ratio: Array, rows: Array, columns: Array, outlying: float = 8.0
     return level
 
 
-def _is_beside(
-    cycles: Array, other: Array, shape: tuple[int, ...], apart: float = _TAPER_REACH + 0.5
-) -> bool:
-    """Return whether a wave, as it is or reversed, is nearer than some modes to one of some others."""
-    distances = (np.abs((sign * other - cycles + 0.5) % 1.0 - 0.5) * shape for sign in (1.0, -1.0))
-    return any(float(distance.max(axis=-1).min(initial=np.inf)) < apart for distance in distances)
+def _beside(
+    cycles: Array, others: Array | list[Array], shape: tuple[int, ...], apart: float = _TAPER_REACH + 0.5
+) -> Array:
+    """Return for other waves whether they, as they are or reversed, are nearer than some modes to a wave."""
+    both = np.multiply.outer([1.0, -1.0], np.reshape(others, (-1, 2)))
+    distance = np.abs((both - cycles + 0.5) % 1.0 - 0.5) * shape
+    return np.asarray(distance.max(axis=2).min(axis=0) < apart)
 
 
 def _mean_square_increment(heights: Array) -> float:
