@@ -294,10 +294,11 @@ class Classes:
         floor = _EMPTY * float(self.level.max())
         return log_means(np.maximum(self.level, floor), np.maximum(self.count * self.information, 1e-3))
 
-    def bins(self, spectrum: MetricSpectrum) -> Bins:
+    def bins(self, spectrum: MetricSpectrum, covariance: Array) -> Bins:
         """Return the bins of the posterior: the rings, with the mean logarithms of their classes.
 
-        Where the exponent differs with the azimuth the mean of the logarithms has the mean exponent.
+        Where the exponent differs with the azimuth the mean of the logarithms has the mean exponent. All
+        rings share the error of the log ratio, whose `covariance` is given.
         """
         modes = self.modes
         edges = modes.shape[0] * modes.dy, float(modes.shape[1])
@@ -313,7 +314,11 @@ class Classes:
         lnq = self.by_ring(self.lnq, self.count)
         level, white = self.by_ring(logs, share), np.add.reduceat(weight, starts)
         ln_alias = np.add.reduceat(even * alias_logs(*self.sample, modes.dy, 2), starts)
-        return Bins(level, 1.0 / total, tables, nodes, t, white, lnq, ln_alias, extent, min(1.0, modes.dy), 2)
+        columns = self.metric_columns(spectrum, self.relative(spectrum))
+        slopes = np.stack([self.by_ring(column, share) for column in columns], axis=1)
+        bins = Bins(level, 1.0 / total, tables, nodes, t, white, lnq, ln_alias, extent, min(1.0, modes.dy), 2)
+        with_prior = np.linalg.solve(np.eye(2) + covariance / RATIO_DEVIATION**2, covariance)
+        return replace(bins, shared=slopes @ with_prior @ slopes.T)
 
     def along(self, spectrum: MetricSpectrum, azimuths: Array) -> Array:
         """Fit amplitude and exponent to all waves, and to those about azimuths (degree).
@@ -437,13 +442,13 @@ def fit_azimuths(
         return classes
 
     def most_probable(
-        classes: Classes, spectrum: MetricSpectrum
+        classes: Classes, spectrum: MetricSpectrum, covariance: Array
     ) -> tuple[Bins, Posterior, MetricSpectrum, Array]:
         """Return bins, posterior, spectrum, and the covariance of its log ratio.
 
         The probability of a hypothesis is multiplied by that of the azimuths, with a metric of its own.
         """
-        bins = replace(classes.bins(spectrum), noise=known.total_noise)
+        bins = replace(classes.bins(spectrum, covariance), noise=known.total_noise)
         found = posterior(bins, known, pilot_spread=float(spectrum.theta[SPREAD]))
         fits, share = [], np.zeros_like(found.share)
         for m in np.flatnonzero(found.share.sum(axis=1) > _POSSIBLE).tolist():
@@ -465,10 +470,10 @@ def fit_azimuths(
         classes = classes_of(spectrum)
         if classes is None:
             return None
-        spectrum = classes.fit_metric(spectrum)[0]
+        spectrum, covariance, _ = classes.fit_metric(spectrum)
         if math.hypot(*spectrum.log_ratio) < least_log_ratio:
             return None
-        bins, found, spectrum, covariance = most_probable(classes, spectrum)
+        bins, found, spectrum, covariance = most_probable(classes, spectrum, covariance)
         moved = math.hypot(*(spectrum.log_ratio - classes.spectrum.log_ratio))
         change = classes.by_ring(np.log(classes.relative(spectrum)), classes.count)
         effect = np.log(classes.by_ring(classes.correction, classes.count)) * (change - change.mean())
@@ -485,7 +490,7 @@ def fit_azimuths(
         # beyond a cut the waves are those of the filling, which know the axes
         p_values = math.nan, math.nan
     if p_values[1] < IMPROBABLE:  # each azimuth is compared with all of them
-        bins, found, spectrum, _ = most_probable(classes, isotropic)
+        bins, found, spectrum, _ = most_probable(classes, isotropic, np.zeros((2, 2)))
         spectrum = replace(spectrum, log_ratio=np.zeros(2))
     return AzimuthFit(classes, spectrum, uv, covariance, bins, found, p_values)
 

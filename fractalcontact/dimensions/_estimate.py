@@ -15,7 +15,7 @@ import xarray as xr
 from fractalcontact.base.grid import core_dims, read_grid
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
-from fractalcontact.base.resources import require_memory
+from fractalcontact.base.resources import has_blocks, require_memory
 from fractalcontact.base.results import announce_loading, public_result
 from fractalcontact.base.study import joined_references
 from fractalcontact.base.validation import Problems, word_tuple
@@ -29,7 +29,6 @@ from fractalcontact.dimensions._surface_input import (
     Surface,
     check_scales,
     check_surface,
-    is_lazy,
     read_scales,
     read_surfaces,
 )
@@ -146,7 +145,7 @@ def estimate(
     """
     surfaces, window = read_surfaces(surface), read_scales(scales)
     names = ("default",) if methods is None else word_tuple(methods)
-    if is_lazy(surface) and set(map(_row, names)) - set(IN_BLOCKS):
+    if has_blocks(surface) and set(map(_row, names)) - set(IN_BLOCKS):
         where, size = "fractalcontact.dimensions.estimate", math.prod(surfaces[0].shape)
         needed = f"{size} heights at once; in blocks: {', '.join(IN_BLOCKS)}"
         require_memory(where, ALL_HEIGHTS * size, needed)

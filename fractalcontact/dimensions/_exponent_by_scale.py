@@ -12,6 +12,7 @@ import xarray as xr
 
 from fractalcontact.base.labelled import leading_coords
 from fractalcontact.base.numbers import Array
+from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._gaussian_mixture import ALIASED, Bins, Lattice, weights
@@ -19,7 +20,7 @@ from fractalcontact.dimensions._likelihood import likelihood
 from fractalcontact.dimensions._mode_fit import first_fit
 from fractalcontact.dimensions._records import NORMAL
 from fractalcontact.dimensions._spectral_posterior import HIGHEST, LOWEST, SPREAD
-from fractalcontact.dimensions._surface_input import Surface, check_surface, is_lazy, read_surfaces
+from fractalcontact.dimensions._surface_input import Surface, check_surface, read_surfaces
 
 _MOST_MISSING = 0.5  # share of the heights
 _LEAST_MODES, _LEAST_BINS = 12, 2  # of an octave
@@ -32,7 +33,7 @@ _NAMES = (*_FIELDS, "mode_count", "in_window", "wavelength", *_OF_WINDOW, "run_t
 def _check(problems: Problems) -> None:
     surface = problems.given.surface
     is_valid = check_surface(problems, smallest=16, reserved=_NAMES)
-    if is_valid and not is_lazy(surface):
+    if is_valid and not has_blocks(surface):
         most = float(surface.isnull().mean([dim for dim in ("y", "x") if dim in surface.dims]).max())
         problems.require(most <= _MOST_MISSING, "surface", "at least half of the heights", f"{1 - most:.0%}")
 

@@ -212,6 +212,8 @@ class Bins:
     noise : float
         Rms height of white noise, if it is known: the amplitude of the surface is then this over the noise
         of theta, in place of free.
+    shared : ndarray, shape (bins, bins), or 0
+        Covariance of an error that the bins share, as that of a metric.
     """
 
     level: Array
@@ -226,6 +228,7 @@ class Bins:
     finest: float
     axes: int
     noise: float = 0.0
+    shared: Array | float = 0.0
 
     @cached_property
     def _logs(self) -> Array:

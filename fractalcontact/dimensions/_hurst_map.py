@@ -139,8 +139,8 @@ def hurst_map(
     ({'y': 5, 'x': 7}, 0.7)
     """
     grid, wavelengths = read_grid(surface), read_scales(scales)
-    edges = [max(SMALLEST, int(nearest_whole(window / spacing))) for spacing in grid.spacing]
-    edges = [min(edge, n) for edge, n in zip(edges, grid.shape, strict=True)]
+    lines = zip(grid.shape, grid.spacing, strict=True)
+    edges = [min(n, max(SMALLEST, int(nearest_whole(window / spacing)))) for n, spacing in lines]
     length = 0.5 * window if step is None else min(float(step), max(grid.extent))
     steps = [max(1, int(nearest_whole(length / spacing))) for spacing in grid.spacing]
     along_axes = zip(grid.shape, edges, steps, strict=True)

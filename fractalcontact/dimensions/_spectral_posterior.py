@@ -422,7 +422,7 @@ def _whitening(kind: Discrepancy, bins: Bins, flat: float = 1e4) -> tuple[Array,
     octaves = bins.lnq / _OCTAVE
     inside = np.ix_(kind.inside, kind.inside)
     correlation = 1.0 if kind.is_filter else np.exp(-np.abs(octaves[:, None] - octaves))
-    covariance = np.diag(bins.variance) + np.outer(kind.scatter, kind.scatter) * correlation
+    covariance = np.diag(bins.variance) + bins.shared + np.outer(kind.scatter, kind.scatter) * correlation
     lower = np.linalg.cholesky(covariance[inside] + (0.0 if bins.noise > 0.0 else flat))
     whitening = np.zeros(covariance.shape)
     # above the diagonal the library leaves zeros or rounding, in one process not as in another

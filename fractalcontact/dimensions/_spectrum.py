@@ -11,6 +11,7 @@ import xarray as xr
 from fractalcontact.base import spectra
 from fractalcontact.base.numbers import Array
 from fractalcontact.base.regression import detrended, logarithm
+from fractalcontact.base.resources import has_blocks
 from fractalcontact.base.results import public_result
 from fractalcontact.base.validation import Problems
 from fractalcontact.dimensions._curve import ALWAYS, PERIODIC, Curve, curve_dataset
@@ -21,7 +22,6 @@ from fractalcontact.dimensions._surface_input import (
     Surface,
     between,
     check_surface,
-    is_lazy,
     read_surfaces,
 )
 
@@ -100,7 +100,7 @@ def spectrum(surface: xr.DataArray, *, taper: str | None = "auto", tile: int | N
     """
     name = "none" if taper is None else taper
     shape = read_surfaces(surface)[0].grid.shape
-    if tile is None and is_lazy(surface) and math.prod(shape) > LARGEST**2:
+    if tile is None and has_blocks(surface) and math.prod(shape) > LARGEST**2:
         tile = min(LARGEST ** (3 - len(shape)), *shape)
     return curve_dataset(
         surface,

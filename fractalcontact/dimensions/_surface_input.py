@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from fractalcontact.base.grid import Grid, read_grid
+from fractalcontact.base.grid import Grid, core_dims, read_grid
 from fractalcontact.base.labelled import check_leading
 from fractalcontact.base.numbers import Array, power_of_two
 from fractalcontact.base.resources import has_blocks
@@ -79,7 +79,7 @@ class Surface:
     @property
     def is_lazy(self) -> bool:
         """Whether the heights are not in memory yet."""
-        return self._heights is None and is_lazy(self.stack)
+        return self._heights is None and has_blocks(self.stack)
 
     @property
     def axes(self) -> int:
@@ -127,13 +127,9 @@ class Surface:
         """Return the middle of a surface in blocks that is too large for a transform; any other as it is."""
         if not self.is_lazy or math.prod(self.grid.shape) <= LARGEST**2:
             return self
-        edge = LARGEST ** (3 - self.axes)
-        cuts = {
-            dim: slice(max(0, (n - edge) // 2), (n + edge) // 2)
-            for dim, n in zip(_core_dims(self.source), self.grid.shape, strict=True)
-        }
-        part = self.source.isel(cuts).load()
-        return Surface(part, read_grid(part, _core_dims(part)))
+        dims, cuts = core_dims(self.source), middle_slices(self.grid.shape, LARGEST ** (3 - self.axes))
+        part = self.source.isel(dict(zip(dims, cuts, strict=True))).load()
+        return Surface(part, read_grid(part, dims))
 
     @property
     def is_complete(self) -> bool:
@@ -225,11 +221,6 @@ class Surface:
             yield np.ascontiguousarray(slab, dtype=np.float64), min(rows, ny - start)
 
 
-def is_lazy(array: xr.DataArray) -> bool:
-    """Return whether the heights are not in memory yet (dask)."""
-    return has_blocks(array)
-
-
 def check_surface(
     problems: Problems,
     *,
@@ -255,9 +246,9 @@ def check_surface(
     before, surface = len(problems.messages), problems.given.surface
     problems.surface("surface", finite=False, smallest=smallest, leading=True, profile=profile)
     check_leading(surface, reserved, problems)
-    if len(problems.messages) > before or is_lazy(surface):
+    if len(problems.messages) > before or has_blocks(surface):
         return len(problems.messages) == before
-    _check_heights(problems, surface.values, len(_core_dims(surface)), gaps)
+    _check_heights(problems, surface.values, len(core_dims(surface)), gaps)
     return len(problems.messages) == before
 
 
@@ -270,7 +261,7 @@ def check_scales(problems: Problems, *, is_valid: bool) -> None:
     if values.size != 2 or not values[0] < values[-1]:
         problems.add("scales", "two ascending lengths in metres, (low, high)")
     elif is_valid:
-        grid = read_grid(surface, _core_dims(surface))
+        grid = read_grid(surface, core_dims(surface))
         shortest, longest = min(grid.spacing), max(grid.extent)
         overlaps = values[0] < longest and values[1] > shortest
         expected = f"a window that meets the lengths of the surface, {shortest:g} m to {longest:g} m"
@@ -279,7 +270,7 @@ def check_scales(problems: Problems, *, is_valid: bool) -> None:
 
 def read_surfaces(surface: xr.DataArray) -> list[Surface]:
     """Split a valid surface along its leading dims; the order is that of these dims flattened."""
-    core = _core_dims(surface)
+    core = core_dims(surface)
     grid = read_grid(surface, core)
     leading = [dim for dim in surface.dims if dim not in core]
     indices = np.ndindex(*(surface.sizes[dim] for dim in leading))
@@ -296,10 +287,6 @@ def between(lengths: Array, scales: Scales) -> Array:
     if scales is None:
         return np.ones(lengths.shape, dtype=bool)
     return np.asarray((lengths >= scales[0] * (1 - 1e-9)) & (lengths <= scales[1] * (1 + 1e-9)))
-
-
-def _core_dims(surface: xr.DataArray) -> tuple[str, ...]:
-    return ("y", "x") if "y" in surface.dims else ("x",)
 
 
 def _check_heights(problems: Problems, heights: Array, axes: int, gaps: bool) -> None:
