@@ -501,6 +501,15 @@ def test_one_exponent_under_an_oblique_lay(lattice, hurst):
     assert float(turned.hurst) == pytest.approx(float(found[0].hurst), abs=3e-3)
 
 
+def test_half_of_the_points_missing_under_an_oblique_lay():
+    """A fit that begins with the blur that filling imitates ended at .59."""
+    surface = oblique(160, 0.7, 0)
+    surface = surface.where(np.random.default_rng(0).random(surface.shape) > 0.5)
+    found = fc.dimensions.estimate(surface).squeeze()
+    assert float(found.ci_low) < 0.7 < float(found.ci_high)
+    assert float(found.hurst) == pytest.approx(0.7, abs=0.02)
+
+
 def test_known_noise_and_blur_under_an_oblique_lay():
     rough = oblique(128, 0.6, 5)
     step = float(np.sqrt(np.mean(rough.diff("x") ** 2)))

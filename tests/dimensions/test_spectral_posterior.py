@@ -1,5 +1,7 @@
 """The posterior of the exponent: Laplace's method beside quadrature, and limits that it must keep."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -130,3 +132,25 @@ def test_a_filter_of_first_order_only_weakens():
     assert rising < 1e-6
     assert even == pytest.approx(0.5)
     assert falling == pytest.approx(1.0)
+
+
+def test_an_error_that_bins_share_adds_to_that_of_the_exponent():
+    """Levels that may all be off as those of another exponent, by .025: its variance grows by the square."""
+    from scipy.stats import norm
+
+    bins = bins_of(0.6)
+
+    def deviation(error):
+        found = sp.posterior(replace(bins, shared=np.outer(error, error)), sp.Known(0.0, 0.0))
+        u, scale = found.centre[0, 0], found.scale[0, 0]  # of an exact surface
+        without_prior = 1.0 / np.sqrt(scale**-2.0 - 1.0)
+        return (sp.HIGHEST - sp.LOWEST) * norm.pdf(u) * without_prior
+
+    def levels(hurst):
+        return bins.log_power(np.array([[hurst, 0.0, 0.0, 0.0, 0.0, 1.0]]), 0)[0][0]
+
+    alone = deviation(np.zeros(bins.lnq.size))
+    assert alone < 0.02
+    assert deviation(np.full(bins.lnq.size, 0.05)) == pytest.approx(alone, rel=1e-3)  # the amplitude is free
+    other = 0.025 / 2e-4 * (levels(0.6 + 1e-4) - levels(0.6 - 1e-4))
+    assert deviation(other) == pytest.approx(np.hypot(alone, 0.025), rel=0.02)
