@@ -110,7 +110,7 @@ def estimate(
     Returns
     -------
     Dataset over the leading dims and `method`
-        `hurst` (limited to 0 ... 1; `fitted_hurst` is not, but by the prior of "likelihood") with
+        `hurst` (limited to 0 ... 1; `fitted_hurst` is not, but that of "likelihood" lies there, too) with
         `standard_error`, `ci_low` and `ci_high`;
         `fractal_dimension` (3 - hurst, of a profile 2 - hurst) with `fractal_dimension_low` and
         `fractal_dimension_high`; `scale_min`, `scale_max` (m) and `window_rule`, how they were chosen;

@@ -44,7 +44,7 @@ _PERIODIC_GAPS = (
     "another kind of surface; see fractalcontact.surfaces.fill"
 )
 _MOSTLY_WAVES = "most of the power is in single waves: no random surface; see fractalcontact.dimensions.waves"
-NO_MODES = "too few modes count: give more points, or a profile where heights vary along one axis alone"
+NO_MODES = "too few modes can be used: give more points, or a profile where heights vary along one axis alone"
 
 
 def too_few_modes(scales: Scales) -> str:

@@ -80,7 +80,8 @@ class FirstFit:
     is_oblique : bool
         The lay is oblique to the axes: cosine modes do not know the sign of an azimuth.
     exact : ndarray
-        Parameters without departures from an exact surface, but a known blur.
+        Parameters of the most probable exact surface: without departures, but with a known blur, of the form
+        ALIASED.
     """
 
     heights: Array
@@ -223,8 +224,10 @@ def first_fit(surface: Surface, spread: float | None = None) -> FirstFit | None:
     is_off_axes = bool(uv[1] ** 2 > float(chdtri(1, FALSE_ALARM)) * variance[1, 1])
     is_oblique = is_off_axes and not lattice.periodic and of_slope * math.hypot(*uv) > NEAR_ISOTROPY
     lattice = replace(lattice, stretch=torus.stretch)
-    known = heights, filled, filling, scale, lattice, spread
-    return FirstFit(*known, theta, hypothesis.form, shrunk, is_oblique, exact=found.peak(0)[2])
+    _, _, exact = found.peak(0)
+    return FirstFit(
+        heights, filled, filling, scale, lattice, spread, theta, hypothesis.form, shrunk, is_oblique, exact
+    )
 
 
 def _tapered(heights: Array, lattice: Lattice, observed: Array) -> tuple[Lattice, Array]:
